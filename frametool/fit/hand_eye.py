@@ -197,7 +197,7 @@ class _Samples(NamedTuple):
 
 
 def _initial_model(samples: _Samples, *, robust: bool) -> tuple[_Model, Array]:
-    """Return the closed-form model with the least median errors, of all samples or of a random subset, and the medians."""
+    """Return the closed-form model with the least median errors, of all samples or of a random subset, and these."""
     count = len(samples.gripper)
     best = (np.inf, _Model(ONE, ONE), np.full(2, np.inf))
     fives: Iterable[Rows] = lsq.draws(DRAWS * robust, min(DRAWN, count - 1), count)

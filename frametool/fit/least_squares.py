@@ -235,7 +235,7 @@ def robust_fit(
 def first_inliers(
     model: Model, u_of: Callable[[Model], Array], rough: Callable[[Model, Array], Model]
 ) -> tuple[Model, Mask]:
-    """Improve a model with weights min(1, 2.5 / u)^2 until they converge; return it and the mask of rows within 3 sigmas."""
+    """Improve a model with weights min(1, 2.5 / u)^2 until they converge; return it and the mask of inliers, u <= 3."""
     weights = None
     for _ in range(FIRST_ROUNDS):
         before, u = weights, u_of(model)

@@ -73,7 +73,7 @@ def parse_limits(text: str) -> list[Limit]:
 
 
 def number_at(value: Any, path: str) -> Any:
-    """Return the value at a path of keys and indices, `ate.m.rmse`, in a mapping; None if there is none."""
+    """Return the value at a path of keys and indices, `ate.m.rmse`, in a mapping; None if the path does not exist."""
     for step in path.split("."):
         try:
             value = value[int(step) if isinstance(value, list) else step]

@@ -34,7 +34,7 @@ class Delta(NamedTuple):
         return f"{self.amount:g}{self.unit}"
 
     def along(self, each: Trajectory) -> Array | None:
-        """Return the cumulative distance at each pose, in `unit`; None if the stamps or rotations it needs are missing."""
+        """Return the cumulative distance at each pose, in `unit`; None if it needs missing stamps or rotations."""
         if self.unit == "frames":
             return np.arange(each.size, dtype=float)
         if self.unit == "m":
@@ -136,7 +136,7 @@ def chained(along: Array, delta: float) -> tuple[Indices, Indices]:
 
 
 def all_pairs(along: Array, delta: float, tolerance: float) -> tuple[Indices, Indices]:
-    """Return for each i the first j whose distance from i is nearest to delta; only those within `tolerance` * delta."""
+    """Return for each i the first j whose distance from i is nearest to delta, only within `tolerance` * delta."""
     wanted = along + delta
     after = np.searchsorted(along, wanted).clip(1, len(along) - 1)
     nearest = np.where(wanted - along[after - 1] <= along[after] - wanted, after - 1, after)

@@ -129,7 +129,7 @@ def bodies_of(measurements: Sequence[Measurement], root: str | None, fixed: Fram
 
 
 class Noise(NamedTuple):
-    """The sigmas of measurements without a covariance (metres, radians), and the factor by which stated ones are too low."""
+    """The sigmas of measurements without a covariance, metres and radians, and the factor for those of the others."""
 
     translation: float = 0.01
     rotation: float = math.radians(1.0)

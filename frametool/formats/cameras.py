@@ -1,4 +1,4 @@
-"""Intrinsics of cameras from files: the cameras in a file, each by its name.
+"""Read the intrinsics of the cameras in a file; cameras are identified by name.
 
     camera: {model: plumb_bob, K: [fx, fy, cx, cy], D: [..], size: [w, h]}      frametool: a file, in a tree, or inline
     camera_matrix: {data: [9]}, distortion_coefficients: {data: [..]}           camera_info of ROS, OpenCV
@@ -9,8 +9,8 @@
     P2: 12 numbers  or  K_02:, D_02:, S_02:, P_rect_02:                         KITTI
     [{sensor_token: .., camera_intrinsic: [9]}, ..]                             nuScenes
 
-Pixels count from the centre of the first one, in COLMAP and NeRF from its corner.  Each reader yields names and the
-arguments of `Camera`; a camera is created on demand, so that an unsupported one does not affect the others.
+Pixel coordinates are 0 at the centre of the first pixel, in COLMAP and NeRF at its corner.  Each reader yields names
+and the arguments of `Camera`; a camera is created on demand, so that an unsupported one does not affect the others.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ KEYS = {
     "model": "distortion_model|model",
 }
 SIZES = ("width", "height"), ("image_width", "image_height")
-# of COLMAP and NeRF: model, number of focal lengths, number of parameters after the centre
+# camera model in COLMAP and NeRF -> our model, number of focal lengths, number of parameters after the centre
 COLMAP = {
     "SIMPLE_PINHOLE": ("pinhole", 1, 0), "PINHOLE": ("pinhole", 2, 0), "SIMPLE_RADIAL": ("plumb_bob", 1, 1),
     "RADIAL": ("plumb_bob", 1, 2), "OPENCV": ("plumb_bob", 2, 4), "FULL_OPENCV": ("rational_polynomial", 2, 8),
@@ -156,7 +156,7 @@ def resized(camera: Camera, size: Sequence[int] | None, source: str) -> Camera:
 
 @contextmanager
 def _placed(source: str, name: str = "", line: int = 0) -> Iterator[None]:
-    """Convert errors about the kind or number of values into a FormatError."""
+    """Convert errors about the kind or number of values into a FormatError with the place."""
     try:
         yield
     except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
@@ -171,7 +171,7 @@ def _placed(source: str, name: str = "", line: int = 0) -> Iterator[None]:
 
 def _read(file: InputFile) -> Found:
     """Yield the name of each camera of a file, and its fields; those of a bag by topic and by frame_id."""
-    is_open = "text" not in vars(file)  # that of a tree has been read
+    is_open = "text" not in vars(file)  # False for a file whose tree has been read
     if is_open and (
         of_folder(file.path) or file.path.endswith(".db3") or file.head().startswith((b"#ROSBAG ", b"\x89MCAP"))
     ):
@@ -250,7 +250,10 @@ def _ours(value: Any, name: str) -> Found:
 
 
 def _by_keys(value: dict[str, Any], end: str = "") -> dict[str, Any]:
-    """Return the fields of the keys that CameraInfo and OpenCV use; empty without a K."""
+    """Return the arguments of `Camera` from the keys of CameraInfo and OpenCV; empty without a K.
+
+    end: number at the end of OpenCV's keys, "" for none
+    """
     found: dict[str, Any] = {}
     for taken, keys in KEYS.items():
         for key, each in value.items():
@@ -276,7 +279,7 @@ def _by_keys(value: dict[str, Any], end: str = "") -> dict[str, Any]:
 
 
 def _of_colmap(name: str, numbers: Sequence[float], size: Sequence[int] | None) -> dict[str, Any]:
-    """Return a camera from a model's name and its parameters; raises ValueInvalid."""
+    """Return the arguments of `Camera` for a model's name and parameters; raises ValueInvalid."""
     if name == ANGLE:  # NeRF's, across the image
         if not size:
             raise ValueInvalid(f"{ANGLE} needs --size W,H")
@@ -326,7 +329,7 @@ def _kitti(file: InputFile) -> Found:
         more = {"size": each} if (each := numbers.get(f"S_rect_0{at}")) else {}
         for name, p in ((f"{camera}{rect}", numbers.get(f"P{at}")), (f"{camera}_rect", stated.get("P"))):
             fields: dict[str, Any] = {"model": "pinhole", "K": p and [p[0:3], p[4:7], p[8:11]], "P": p, **more}
-            if p and "R" in stated and (t := numbers.get(f"T_0{at}")):  # the part of P beyond the pose of the frame
+            if p and "R" in stated and (t := numbers.get(f"T_0{at}")):  # the translation of P that T lacks
                 turn, centre = stated["R"], Camera(**fields).rectified(from_first=True).fields["shift"]
                 fields["shift"] = [c - sum(turn[3 * i + k] * t[k] for k in range(3)) for i, c in enumerate(centre)]
             if p:

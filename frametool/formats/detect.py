@@ -1,6 +1,6 @@
 """Detect the format of a file by its first bytes and its name; nothing else guesses.
 
-Kinds of signs in the table, the strongest first.  Signs with priority over the suffix belong to one format only:
+Kinds of signs in the table, the strongest first.  Signs that have priority over the suffix belong to one format only:
 
     magic      a pattern of the first bytes
     folder     a file in the folder
@@ -12,8 +12,8 @@ Kinds of signs in the table, the strongest first.  Signs with priority over the 
     yaml key   a pattern of a key at the beginning of a line
     yaml inner a pattern of a nested key
     text       a pattern found in the first characters
-    entries    a pattern of keys in the maps, or lists of seven numbers, that all outermost keys have, or
-               the outermost `transforms` or `extrinsics`; without any key of a message
+    entries    all values of the outermost map, or of its only key `transforms` or `extrinsics`, are poses: maps with
+               a key of this pattern, or lists of seven numbers; none is a message
     line       a pattern of the first line of data, after blank lines, comments and text that tools print
     last       a pattern found in the first characters, if nothing above fits
 
@@ -51,13 +51,13 @@ class Beginning:
 
     @cached_property
     def text(self) -> str:
-        """Return the bytes as text, with one kind of line ends."""
+        """Return the bytes as text, with line feeds as line ends."""
         encoding = "utf-16" if self.head.startswith(UTF16) else "utf-8-sig"
         return self.head.decode(encoding, "replace").replace("\r\n", "\n")
 
     @cached_property
     def data_line(self) -> str:
-        """Return the first line of data."""
+        """Return the first line of data: not blank, a comment, `---`, or text that tools print."""
         from frametool.ros.messages import is_noise
 
         lines = (line for line in self.text.splitlines() if line.strip() and not line.startswith(("#", "---")))
@@ -82,7 +82,7 @@ class Beginning:
 
     @cached_property
     def json_paths(self) -> set[str]:
-        """Return the paths of the keys of JSON; lists on the path are skipped."""
+        """Return the paths of the keys of JSON, `frames/name`; lists on the path are skipped."""
         from frametool.documents.document import looks_like_json
 
         found: set[str] = set()
@@ -107,9 +107,9 @@ class Beginning:
 
     @cached_property
     def value(self) -> Any:
-        """Return the first value of YAML or JSON, as far as the text is read, as `Node` has it; None if there is none.
+        """Return the first YAML or JSON value in the first LOOKED_AT characters; None if they have no value.
 
-        Maps have pairs of nodes, lists have nodes.
+        It is as in `Node.value`: a map is key -> (key node, value node), a list has nodes, a scalar is its text.
         """
         from frametool.documents.document import nodes_of
         from frametool.documents.yaml import yaml_events
@@ -126,7 +126,7 @@ class Beginning:
 
     @cached_property
     def root(self) -> str:
-        """Return the name of the root element of XML, if it is there."""
+        """Return the name of the root element of XML, "" if it is not in the text."""
         found = re.search(r"<([\w.:-]+)", self.xml[:LOOKED_AT])
         return found[1] if found else ""
 
@@ -164,7 +164,7 @@ def _is_key(pattern: str, keys: Iterable[str]) -> bool:
     return any(map(re.compile(pattern).fullmatch, keys))
 
 
-# kind -> the property of Beginning that is searched, "" for all of it, and the function that matches; strongest first
+# kind -> the property of Beginning to search ("": all of it), and the function that matches; strongest first
 _STRONG: dict[str, tuple[str, Callable[..., Any]]] = {
     "magic": ("head", partial(re.match, flags=re.DOTALL)),
     "xml text": ("xml", re.search),
@@ -184,7 +184,7 @@ _KINDS = _STRONG | _WEAK
 
 
 def _fitting(begin: Beginning, kinds: Iterable[str], names: Iterable[str]) -> tuple[list[str], str]:
-    """Return the formats that match a sign of the strongest matching kind, and that kind."""
+    """Return the formats that match a sign of the strongest matching kind, and this kind ("" without a match)."""
     found: dict[str, str] = {}
     for kind in kinds:
         searched, fits = _KINDS[kind]
@@ -193,13 +193,13 @@ def _fitting(begin: Beginning, kinds: Iterable[str], names: Iterable[str]) -> tu
             for of, what in (UNSUPPORTED.get(name) or FORMATS[name]).magic:
                 if of == kind and name not in found and fits(what, text):
                     found[name] = kind
-        if found and kind != "yaml key":  # which is as strong as nested keys
+        if found and kind != "yaml key":  # outermost keys are as strong as nested ones
             break
     return [*found], next(iter(found.values()), "")
 
 
 def by_sign(head: bytes | Beginning, *reads: str, name: str = "") -> str | None:
-    """Return the format, among those from which `reads` is read, that matches the first bytes; None if none does.
+    """Return the format that the first bytes identify, among the formats read as one of `reads`; None without a match.
 
     Supported formats have priority.  Raises FormatError if two formats fit, or an unsupported one.
     """
@@ -219,22 +219,22 @@ _NO_POSES = "no poses in it (frametool tree shows the frames); give what it was 
 
 
 def not_read(fmt: str, name: str) -> FormatError:
-    """Return the error for a file that is recognised but not supported: its description and what to do instead."""
+    """Return the error for a format that is recognised but not supported: its description and what to do instead."""
     about = str(UNSUPPORTED[fmt]) if fmt in UNSUPPORTED else f"{FORMATS[fmt].summary}: {_NO_POSES}"
     return FormatError(about, source=name or "stdin")
 
 
 def of_folder(path: str) -> str | None:
-    """Return the format of a folder; None for a file, and for any other folder."""
+    """Return the format of a folder; None for a file or any other folder."""
     return next((fmt for fmt, what in FOLDERS.items() if os.path.exists(os.path.join(path, what))), None)
 
 
 def detect(head: bytes, *reads: str, name: str = "", otherwise: str = "", empty: str = "") -> str:
-    """Return the format of a file, among the formats from which `reads` is read.
+    """Return the format of a file, among the formats read as one of `reads`.
 
-    head: its first bytes; name: of the file, "" for standard input; otherwise: the default format; empty: the format of
-    a file with nothing but comments.
-    Raises FormatError if nothing matches and there is no default, or two formats fit.
+    head: its first bytes; name: of the file, "" for standard input
+    otherwise: the default format; empty: the format of a file that has only comments
+    Raises FormatError if nothing matches and there is no default, or if two formats fit.
     """
     begin = Beginning(head)
     if fmt := by_sign(begin, *reads, name=name):
@@ -277,7 +277,7 @@ def _no_text(what: str, name: str) -> FormatError:
 
 
 def instead_of_text(error: FormatError, path: str) -> FormatError:
-    """Return the error for a binary file instead of a pose: its kind, not the position of an invalid byte."""
+    """Return the error for a binary file in place of a pose: its kind, not the position of an invalid byte."""
     with open(path, "rb") as file:
         head = file.read(HEAD)
     what = not_text(head)
@@ -292,7 +292,7 @@ _KEYS = (
     r"orientation|rotation|quaternion|matrix|(?:xyz|rpy|euler)\w*"
 )
 _OURS = r"(?:\w*[._])?(?:q?[xyz]|qw|roll|pitch|yaw|frame|frame_id|name|parent)"
-# a number as a cell or a value, one at the beginning of a line, a frametool key, a list or map, a header
+# what data have: a number as a cell or value, or at the beginning of a line; a frametool key, a list or map; a header
 _DATA = "(?im)" + "|".join((
     rf"[,;\t:{{][ \t]*+{_NUM}[ \t]*(?=[,;\t\]}}]|$)|\[[ \t]*{_NUM}[ \t]*[,;]",
     rf"^[ \t]*+(?:- )*{_NUM}(?:[ \t]+{_NUM}|[ \t]*$|[,;\t])",
@@ -303,7 +303,7 @@ _MOST_NAMED = 8
 
 
 def _unknown(begin: Beginning, *reads: str, name: str) -> FormatError:
-    """Return the error for a file without a sign: how it begins, and the list of formats."""
+    """Return the error for a file whose format is not detected: how it begins, and the formats."""
     likely = readers(*reads)
     what = "this text"
     if begin.xml:
@@ -323,7 +323,10 @@ _MESSAGES = ("echo", "jsonl", "calls", "csv1", "csv2")  # formats that are read 
 
 
 def with_hint(error: FormatError, text: bytes, name: str, *, chosen: bool = False) -> FormatError:
-    """Return the error for text without a pose; for frames it suggests `lookup`; prose is not quoted."""
+    """Return the error for text without a pose: for frames it suggests `lookup`, for unknown text it lists formats.
+
+    error: returned if neither applies; chosen: the format was set by the user
+    """
     begin = Beginning(text[:HEAD])
     has_sign = bool(_fitting(begin, _STRONG, (*FORMATS, *UNSUPPORTED))[0])
     is_known = begin.has_data or by_suffix(name, readers("records", "rows")) or has_sign

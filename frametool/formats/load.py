@@ -1,7 +1,7 @@
-"""Read files of frames and merge them into one tree; errors name the places where files disagree.
+"""Read files of frames and merge them into one tree; errors name both places where files disagree.
 
-Each file is read by the module of its format; edges become a FrameTree while everything is static, and a
-TransformBuffer once something moves.  This module does not know the formats themselves.
+Each file is read by the module of its format; edges are added to a FrameTree as long as all are static, and to a
+TransformBuffer from the first stamp on.  This module does not know the formats themselves.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ if TYPE_CHECKING:
 class FrameFile(InputFile):
     """A file of frames and its format."""
 
-    reader: Any = None  # takes the file and Options and yields edges; None is that of the format
+    reader: Any = None  # function of the file and Options that yields edges; None: that of the format
 
     def __init__(
         self,
@@ -75,7 +75,7 @@ class FrameFile(InputFile):
 
     @classmethod
     def inline(cls, source: Source) -> FrameFile:
-        """Create from a tree written on the command line or already read."""
+        """Create from text: a tree written on the command line, or already read."""
         made = cls(source.name, BytesIO(), "yaml")
         made.text = source.text
         return made
@@ -87,7 +87,10 @@ class FrameFile(InputFile):
 
     @property
     def required_options(self) -> tuple[str, ...]:
-        """Return what the file does not specify; of tables also frames without columns, of recordings poses."""
+        """Return the options for what the file does not specify.
+
+        Tables need `frames` unless they have columns for parent and child; recordings accept it if topics are chosen.
+        """
         row = FORMATS[self.format]
         if self.format in ("csv", "tsv", "semicolon"):
             words = {word.strip('"# \r') for word in Beginning(self.head()).first_line.split(row.rows.delimiter)}
@@ -95,7 +98,7 @@ class FrameFile(InputFile):
         return (*row.required_options, *["frames"] * bool(self.topics.chosen))
 
     def edges(self, report: Report = stop, *, tell: bool = True, normalize: bool = False) -> Iterator[Edge]:
-        """Yield the edges in the order of the file, then emit warnings; otherwise as `pieces`."""
+        """Yield the edges one by one, in the order of the file, then emit warnings; parameters as for `pieces`."""
         for piece in self.pieces(report, tell=tell, normalize=normalize):
             yield from (piece,) if isinstance(piece, Edge) else piece.edges()
 
@@ -149,7 +152,7 @@ def opened_together(files: Iterable[FrameFile]) -> list[FrameFile]:
 
 
 def refuse_unknown_joints(files: Sequence[FrameFile]) -> None:
-    """Raise the error for a joint in options or files that no file has, once all were read."""
+    """Raise the error for a joint value, from options or files, of a joint that no robot has; call it after reading."""
     option, robots = "", list[Diagnostics]()
     for file in files:
         if file.answers.joints or file.answers.joint_files:
@@ -164,7 +167,7 @@ def refuse_unknown_joints(files: Sequence[FrameFile]) -> None:
 
 
 class Rules(NamedTuple):
-    """How moving frames are read, and rotations that are not exact.
+    """How a tree is built: static and moving frames, inexact rotations, and the Earth's frame.
 
     moving: an edge with one stamp is valid only at that time, as in tf2; otherwise it is static
     keep_ns: as for TransformBuffer
@@ -179,7 +182,7 @@ class Rules(NamedTuple):
 
 
 class TreeBuilder:
-    """The edges read so far, and the place where each frame was first defined."""
+    """The edges read so far, and the place of each frame's first definition."""
 
     def __init__(self, name: str, rules: Rules | None = None) -> None:
         """Create an empty builder; `name` is that of the source, for messages."""
@@ -190,20 +193,20 @@ class TreeBuilder:
         self.buffer: TransformBuffer | None = None
         self.first: dict[str, tuple[str, Rigid, EdgePlace]] = {}  # child -> its first definition
         self._replaced: list[tuple[str, str, EdgePlace]] = []  # samples that replaced another one at the same stamp
-        self._moves: set[str] = set()
-        self._late: set[str] = set()  # children with a warning that their samples go back in time
+        self._moves: set[str] = set()  # children with samples at several stamps
+        self._late: set[str] = set()  # children whose samples go back in time, for one warning each
         self.covariances: dict[str, Components] = {}  # child -> the covariance of its edge
         self.cameras: dict[str, Camera] = {}  # by their frames
 
     def one_name(self, frame: str) -> str:
-        """Return a name; for the Earth's frame that of its two names which was used first."""
+        """Return the name of a frame; for the Earth's frame (`earth` or `ecef`) the name that was used first."""
         if frame not in EARTH_FRAMES:
             return frame
         self.earth = self.earth or frame
         return self.earth
 
     def add(self, place: EdgePlace) -> None:
-        """Add an edge, one sample of it, or a root; an edge between the names of the Earth's frame is the identity.
+        """Add an edge, one sample of it, or a root; an edge between `earth` and `ecef` must be the identity.
 
         Raises BadTopology and FormatError with the place.
         """
@@ -239,7 +242,7 @@ class TreeBuilder:
             self.covariances[child] = edge.covariance
 
     def _record(self, parent: str, child: str, place: EdgePlace) -> None:
-        """Add a sample, or a static edge next to samples; not a duplicate, once with and once without a stamp."""
+        """Add a sample or a static edge to the buffer; the same pose with a stamp and without one counts once."""
         buffer, components, stamp_ns = self._moving(), place.edge.components, place.edge.stamp_ns
         track = buffer.track(child)
         settled = track is not None and child not in self._moves and (track.is_static or stamp_ns is None)
@@ -252,10 +255,10 @@ class TreeBuilder:
             self._replaced.append((parent, child, place))
 
     def add_columns(self, file: FrameFile, piece: EdgeColumns) -> None:
-        """Add edges, frame by frame, if their order is known to be correct, else one by one."""
+        """Add a block of edges: the samples of a frame all at once if they are in order, the others one by one."""
         pairs = [*zip(piece.parents, piece.children, strict=True)]
         found: dict[tuple[str, str], Any] = {pair: [] for pair in pairs}
-        # the order of new edges matters for cycles
+        # several new edges are added one by one: their order matters for cycles
         known = len(found) == 1 or all(self._goes_on(*pair) for pair in found)
         if len(found) == 1:
             found[pairs[0]] = piece[2:5]
@@ -284,12 +287,12 @@ class TreeBuilder:
                 self.add(EdgePlace(file, edge))
 
     def _goes_on(self, parent: str, child: str) -> bool:
-        """Return True if a frame is known to move and is in this parent now."""
+        """Return True if a frame already has several samples, and its parent is this one."""
         track = None if self.buffer is None or child not in self._moves else self.buffer.track(child)
         return track is not None and not track.is_static and track.parent == parent
 
     def _takes_whole(self, parent: str, child: str, stamps_ns: Sequence[Any]) -> bool:
-        """Return True if samples are all later than known ones: of a new frame, or one moving in the same parent."""
+        """Return True if samples can be added all at once: in ascending order, and later than the known ones."""
         if self.rules.keep_ns is not None or len(stamps_ns) < 2 or stamps_ns[0] is None or child in self.covariances:
             return False
         track = None if self.buffer is None else self.buffer.track(child)
@@ -300,7 +303,7 @@ class TreeBuilder:
         return follows and all(map(lt, stamps_ns, islice(stamps_ns, 1, None)))
 
     def _moving(self) -> TransformBuffer:
-        """Return the buffer; at the first stamp it receives the static edges."""
+        """Return the buffer; it is created at the first stamp, with the static edges so far."""
         if self.buffer is None:
             from frametool.frames.buffer import TransformBuffer
 
@@ -312,9 +315,10 @@ class TreeBuilder:
         return self.buffer
 
     def settled(self, buffer: TransformBuffer) -> FrameTree | TransformBuffer:
-        """Return a buffer, or the tree of its static edges if nothing moves; a frame with one stamp is static.
+        """Return the buffer, or a tree of its static edges if nothing moves.
 
-        Refuses static frames with two values; warns about moving ones with two poses at one stamp.
+        Without `moving`, a frame with one stamp is static.  Raises BadTopology for a static frame with two poses; warns
+        of a moving frame with two poses at one stamp.
         """
         single = {track.child for track in buffer.tracks() if not track.is_static and track.child not in self._moves}
         static = set() if self.rules.moving else single
@@ -342,7 +346,7 @@ class TreeBuilder:
         return buffer if buffer.moves else tree
 
     def _placed(self, error: BadTopology, parent: str, child: str, place: EdgePlace) -> FormatError:
-        """Return the error for a place; if it contradicts an earlier definition, both places are named."""
+        """Return an error with its place, or with both places if it contradicts an earlier definition."""
         known = self.first.get(child)
         if error.rule in ("cycle", "self") or known is None or known[2] is place:
             return place.error(str(error), BadTopology)
@@ -353,13 +357,13 @@ class TreeBuilder:
 
 
 class EdgePlace(NamedTuple):
-    """The place where an edge was read."""
+    """An edge and the file it was read from, for messages."""
 
     file: FrameFile
     edge: Edge
 
     def error(self, message: str, kind: type[FormatError]) -> FormatError:
-        """Return the error for this place."""
+        """Return an error at the line of this edge."""
         return file_error(self.file, message, self.edge.line, self.edge.path, kind)
 
     def seen_from(self, other: EdgePlace) -> str:
@@ -369,7 +373,7 @@ class EdgePlace(NamedTuple):
 
 
 def checked_answers(answers: dict[str, Any]) -> dict[str, Any]:
-    """Return answers about a format; raise ValueInvalid for words that are not among the choices."""
+    """Return options about a format unchanged; raises ValueInvalid for words that are not among the choices."""
     for ask, choices in CHOICES.items():
         if (answer := answers.get(ask)) and answer not in choices:
             raise ValueInvalid(f"{ask} is {' or '.join(choices)}, not {shown(answer)}")
@@ -377,7 +381,7 @@ def checked_answers(answers: dict[str, Any]) -> dict[str, Any]:
 
 
 def listed(values: Any) -> tuple[Any, ...]:
-    """Return several texts, paths or trees as a tuple; one by itself is not taken apart."""
+    """Return texts, paths or trees as a tuple; a single one as a tuple of one."""
     return (values,) if isinstance(values, str | PathLike | Frames) else tuple(values)
 
 
@@ -419,9 +423,9 @@ def load(
 def load_sources(
     sources: Sequence[Source | FrameFile], rules: Rules | None = None, places: dict[str, EdgePlace] | None = None
 ) -> FrameTree | TransformBuffer:
-    """Merge the frames of several texts and files; otherwise as `load`.
+    """Merge the frames of several texts and files as `load` does.
 
-    places: is filled with the place where each frame was first defined
+    places: receives the place of each frame's first definition
     """
     files = [FrameFile.inline(source) if isinstance(source, Source) else source for source in sources]
     builder = TreeBuilder(", ".join(map(attrgetter("name"), files)), rules)
@@ -445,7 +449,7 @@ def load_sources(
     tree.cameras = builder.cameras
     held, tree.robots = list[FrameFile](), []
     for file in files:
-        tree.camera_axes.update(filter(itemgetter(1), file.tally.axes.items()))  # those that are known
+        tree.camera_axes.update(filter(itemgetter(1), file.tally.axes.items()))  # only known axes
         tree.drawn |= file.tally.drawn
         if file.tally.robot is not None:
             tree.robots.append(file.tally.robot)
@@ -465,7 +469,7 @@ def _read_cameras(tree: FrameTree | TransformBuffer, files: Sequence[FrameFile])
 
 
 def lines_of(places: Sequence[EdgePlace]) -> list[tuple[str, int]]:
-    """Return file and line of many places; each file is scanned once; 0 if the line is unknown."""
+    """Return file name and line of each place (0 if the line is unknown); each file is scanned once."""
     lines: dict[int, int] = {}
     for file in {id(each.file): each.file for each in places}.values():
         inside = [each for each in places if each.file is file and each.edge.path]

@@ -9,13 +9,13 @@ from frametool.errors import NamedTuple
 
 
 class Rows(NamedTuple):
-    """How the rows of a format look, and the poses in them.
+    """The layout of a format's rows, and the meaning of the poses in them.
 
-    delimiter: between the cells, "" for blanks; None if there are no such rows
-    columns: in order, if there is no header; widths: allowed numbers of columns, if others are refused
-    rotation: the notation of the numbers after the position
+    delimiter: between the cells, "" for blanks; None if the file is not a table
+    columns: in order, if there is no header; widths: allowed numbers of columns, () for any
+    rotation: the representation of the numbers after the position
     inverse: the file has the pose of the world in the body, not of the body in the world
-    axes: of a camera, `optical` or `opengl`
+    axes: of a camera, `optical` or `opengl`, "" for other bodies
     frames: default names of world and body
     counted: the meaning of the numbers that replace stamps; "" if rows have stamps
     """
@@ -104,7 +104,7 @@ def _messages(summary: str, *magic: tuple[str, str | bytes], reader: str = _MESS
 
 _CAMERAS = ("tree", "cameras")
 
-# options for what the format of a file does not specify
+# choices of options for what the format of a file does not specify
 DIRECTIONS = ("parent-from-child", "child-from-parent")
 CAMERA_AXES = ("optical", "opengl")
 DH = ("standard", "modified")
@@ -114,7 +114,7 @@ _CAMERA = ("world", "camera")
 _TREE = "frametool.formats.trees.tree_reader"
 _TABLE = "frametool.rows.conversion"
 NUMBER = r"[-+]?(?:\d++\.?\d*+|\.\d++)(?:[eE][-+]?\d++)?"
-_ONE_COLUMN = r"\ufeff?\"?[A-Za-z]\w*(?: ?[\[(][a-z]+[\])])?\"?[ \t]*\r?\n[-+.\d]"  # a name above numbers
+_ONE_COLUMN = r"\ufeff?\"?[A-Za-z]\w*(?: ?[\[(][a-z]+[\])])?\"?[ \t]*\r?\n[-+.\d]"  # a column name above a number
 _MESSAGE_KEYS = (
     "transforms|static_transforms|header|child_frame_id|- header|linear|wrench|twist|pose|point|vector|force"
 )
@@ -140,13 +140,13 @@ _KITTI = (
     r"(?:P[0-3]|Tr\w*|R0_rect|R_rect|R):?(?:[ \t]+[^\s:]+){5})"
 )
 
-# numbers without a comment that names its columns otherwise
+# rows of numbers, without a comment that names other columns
 _UNNAMED = r"(?m)\A\ufeff?(?:[ \t]*(?:#(?!(?=.*\b(?:%s)\b)%s[ \t\r]*$).*)?\r?\n)*+[ \t]*"
 _LIKE_EUROC = _UNNAMED % ("q_?w|roll|yaw", r"(?:[^,\n]*+,){7}(?:(?:[^,\n]*+,){9})?[^,\n]*")
 _LIKE_KITTI = _UNNAMED % (r"r1[13][ \t]+r21|z[ \t]+r11|r33[ \t]+t?x", r"(?:[ \t]*+\S++){12}")
 
 _KEY = r"""(?:\s|\{|#[^\n]*\n)*+["']?(?:%s)["']?:[ \t]*+"""
-_PARTS = "linear|angular|force|torque|position|translation"  # of a message
+_PARTS = "linear|angular|force|torque|position|translation"  # keys of a message
 _FIRST = r"""(?m)^[ \t{]*+["']?[\w./-]+["']?:[ \t]*+"""  # no lines before it: the search begins at each line
 _TWO_KEYS = _FIRST + _KEY % rf"(?!(?:{_PARTS})['\":])[\w./-]+"
 _POSE_IN_TWO = rf"{_TWO_KEYS}(?:{_KEY % 'x|y|z|roll|pitch|yaw'}{NUMBER}[ ,]*){{3,}}+(?!{_KEY % 'q?[wxyz]'}{NUMBER})"
@@ -418,12 +418,12 @@ FOLDERS = {name: str(what) for name, row in FORMATS.items() for kind, what in ro
 
 
 def readers(*what: str) -> tuple[str, ...]:
-    """Return the formats from which any of `tree`, `records` and `rows` is read."""
+    """Return the formats that are read as any of these kinds: `tree`, `records`, `rows` and so on."""
     return tuple(name for name, row in FORMATS.items() if not set(what).isdisjoint(row.reads))
 
 
 def writers(*what: str) -> tuple[str, ...]:
-    """Return the formats in which any of `poses`, `points`, a `trajectory`, a `tree` or a `report` is written."""
+    """Return the formats that are written as any of these kinds: `poses`, `points`, `trajectory`, `tree`, `report`."""
     return tuple(name for name, row in FORMATS.items() if not set(what).isdisjoint(row.writes))
 
 
@@ -433,19 +433,19 @@ def is_trajectory(name: str) -> bool:
 
 
 def holds(name: str | None, *what: str) -> bool:
-    """Return True if any of these is read from a format or written in it: `arrays`, a `recording`; neither is text."""
+    """Return True if a format is read or written as any of these kinds, such as `arrays` or `recording` (not text)."""
     return name in FORMATS and not {*what}.isdisjoint(FORMATS[name].reads + FORMATS[name].writes)
 
 
 def by_name(path: str | None, names: tuple[str, ...]) -> str | None:
-    """Return which of several formats is written to a file: by its whole name, by its suffix, by a format's name."""
+    """Return the format of `names` for an output file: by its whole name, its suffix, or a format's name as suffix."""
     last = os.path.basename(path or "")
     by_whole = next((name for name in names if last in FORMATS[name].names), None) or by_suffix(path, names)
     return by_whole or next((name for name in names if last.lower().endswith(f".{name}")), None)
 
 
 def by_suffix(path: str | None, names: tuple[str, ...], table: dict[str, Any] = FORMATS) -> str | None:
-    """Return which of several formats of a table has the suffix of a file, if any."""
+    """Return the format of `names`, in a table, with the suffix of a file; None without one."""
     suffix = os.path.splitext(path or "")[1].lower()
     return next((name for name in names if suffix in table[name].suffixes), None)
 

@@ -69,14 +69,14 @@ class Cell(NamedTuple):
 
 
 class Amount(NamedTuple):
-    """An angle or a length, in degrees or in radians and metres; `variable` is the name of the joint value in it."""
+    """An angle in radians or degrees, or a length in metres, plus the joint value named by `variable`, if any."""
 
     number: float = 0.0
     degrees: bool = False
     variable: str = ""
 
     def plus(self, other: Amount) -> Amount:
-        """Add another amount."""
+        """Return the sum with another amount."""
         if self.degrees == other.degrees or not other.number:
             return self._replace(number=self.number + other.number)
         one, two = (radians(each.number) if each.degrees else each.number for each in (self, other))
@@ -84,7 +84,7 @@ class Amount(NamedTuple):
 
 
 class DhRow(NamedTuple):
-    """One joint: theta and d with their offsets, and its line."""
+    """One joint: its parameters, of which theta and d include their offsets, and its line."""
 
     name: str
     kind: str
@@ -96,7 +96,7 @@ class DhRow(NamedTuple):
 
 
 def rows_of(file: InputFile, tally: Diagnostics) -> list[DhRow]:
-    """Return the rows of a table, and note its other contents; raises FormatError with the place."""
+    """Return the rows of a table, with a warning for columns that are not read; raises FormatError with the place."""
     text = file.text
     is_document = looks_like_json(text) or re.search(r"(?m)^ *(?:- *)?[{\[]|^ *(?:- +)?[\w.-]+:(?:\s|$)", text)
     rows: dict[str, DhRow] = {}
@@ -115,14 +115,14 @@ def rows_of(file: InputFile, tally: Diagnostics) -> list[DhRow]:
 
 
 def _cells(items: Iterable[Item], others: dict[str, None]) -> dict[str, Cell]:
-    """Return the cells of a row by the names of columns; `others` receives the names of columns that are not read."""
+    """Return the cells of a row by column; `others` receives the names of columns that are not read."""
     cells: dict[str, Cell] = {}
     known = [each for names in COLUMNS.values() for each in names if len(each) > 1]
     for written, value, fail in items:
         name, unit = column_of(written) or ("", "")
         if not name:
             near = did_you_mean(written.strip().lower(), known, cutoff=0.75)
-            if near or value is None:  # the part behind a decimal comma is a key without a value
+            if near or value is None:  # in YAML, a decimal comma leaves a key without a value
                 raise fail(f"unknown column {shown(written)}{near}; a row has {', '.join(COLUMNS)}")
             others[written] = None
         elif name in cells:
@@ -135,7 +135,7 @@ def _cells(items: Iterable[Item], others: dict[str, None]) -> dict[str, Cell]:
 
 
 def column_of(written: str) -> tuple[str, str] | None:
-    """Return the column with a header name, by any of the names in use, and its unit; None for other names."""
+    """Return the column of COLUMNS that a header names, and its unit; None for other names."""
     base, unit = written.strip().lower(), ""
     for pattern in (_BRACKETED, _SUFFIXED):
         if (match := re.fullmatch(pattern, base)) and match[2] in UNITS:
@@ -173,7 +173,7 @@ def _row(number: int, cells: dict[str, Cell], fail: Fail, line: int) -> DhRow:
 
 
 def _read(cell: Cell, read: Callable[[str, str], Amount]) -> Amount:
-    """Read a number, or the joint's variable and an offset; raises the error of the cell."""
+    """Read a number, or the name of a joint value with an offset; raises the error of the cell."""
     try:
         return read(cell.text, cell.unit)
     except ValueInvalid as error:
@@ -232,7 +232,7 @@ def _split(line: str) -> list[LineCell]:
 
 
 def _of_documents(file: InputFile) -> Iterator[tuple[list[Item], Fail, int]]:
-    """Yield the rows of YAML or JSON."""
+    """Yield the rows of a table in YAML or JSON."""
     source = file.source
     for document in parse_documents(source.text, source.name):
 
@@ -251,7 +251,7 @@ def _of_documents(file: InputFile) -> Iterator[tuple[list[Item], Fail, int]]:
 
 
 def _tables(value: Any, path: Path, fail: Callable[..., FormatError]) -> Iterator[list[tuple[Path, list[Any]]]]:
-    """Yield each table as its rows, with their paths; each row as keys, values and the paths of these below it."""
+    """Yield each table as a list of rows: (path, cells); a cell is (key, value, path below the row)."""
     if len(path) > 4 or type(value) not in (dict, list) or not value:
         return
     items = list(value.items() if type(value) is dict else enumerate(value))

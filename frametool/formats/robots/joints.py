@@ -46,10 +46,10 @@ HALF_TURN = 3.141592653589793
 
 
 class JointState:
-    """The values of all joints of a robot: one each, or samples over time.
+    """The values of all joints of a robot, constant or sampled over time.
 
-    series: name -> stamp -> value; the only stamp is None if the value is the same at all times
-    named: names of the joints with a value; the others follow them, or are at rest
+    series: name -> stamp -> value; a constant value has the single stamp None
+    named: names of the joints with a value from options or files; the others mimic these, or are at rest
     """
 
     def __init__(self, joints: Iterable[Joint], options: Options, file: str, *, fixed: Collection[str] = ()) -> None:
@@ -95,12 +95,12 @@ class JointState:
 
     @property
     def still(self) -> dict[str, Value]:
-        """Return the joints with the same value at all times."""
+        """Return the values of joints that are constant, by name."""
         return {name: series[None] for name, series in self.series.items() if None in series}
 
     @property
     def moving(self) -> list[str]:
-        """Return the names of the other joints."""
+        """Return the names of joints with samples over time."""
         return [name for name, series in self.series.items() if None not in series]
 
     def edges(self, links: Iterable[Link]) -> Iterator[Edge]:
@@ -112,9 +112,9 @@ class JointState:
                 yield Edge(link.parent, link.child, link.pose(values), stamp_ns, link.line)
 
     def values(self, *names: str) -> Iterator[tuple[int | None, list[Value]]]:
-        """Yield the values of joints that move one frame together: once without a stamp, or at each of their times.
+        """Yield the values of joints that move one frame together: once with stamp None, or at each time of any.
 
-        A joint without a sample at the time of another one is interpolated.
+        A joint without a sample at a time of another one is interpolated, within the time that they share.
         """
         times = {name: [at for at in self.series[name] if at is not None] for name in names}
         moving = {name: series for name, series in times.items() if series}
@@ -147,7 +147,7 @@ class JointState:
         return JointValue(one.plain + (two.plain - one.plain) * fraction)
 
     def _take_file(self, path: str) -> None:
-        """Read all values of a file: constant ones as a single value; without times the last one is used."""
+        """Read all values of a file; equal values of a joint are a constant, without times the last one is used."""
         found: dict[str, list[tuple[int | None, Value]]] = {}
         sample = None
         for sample in read_joint_file(path, self.joints):
@@ -170,15 +170,15 @@ class JointState:
             self.series[name] = {None: last} if is_constant else dict(in_order)
 
     def _unknown(self, joint: str) -> str:
-        """Return the error that the robot has no such joint, or that it is fixed."""
+        """Return the message that the robot has no such joint, or that it is fixed."""
         if joint in self._fixed:
             return f"joint {shown(joint)} is fixed and takes no value; joints: {listing(self.joints)}"
         return f"no joint {shown(joint)}{alternatives(joint, self.joints, 'joints')}"
 
     def _follow(self) -> list[str]:
-        """Set each joint without a value: from its leader, along chains of any length, or at rest.
+        """Set each joint without a value: from the joint it mimics, along chains of any length, or at rest.
 
-        Returns the names of those that no value determines.
+        Returns the names of the joints that no value determines.
         """
         known = set(self.named)
         for name, leader in leaders_first(self.joints, self.joints, self.named, self._file).items():
@@ -196,7 +196,7 @@ class JointState:
         return [name for name in self.joints if name not in known]
 
     def _tell_limits(self) -> None:
-        """Record values beyond limits, and steps that a pose cannot follow."""
+        """Record warnings: values beyond limits, and steps of half a turn or more, whose direction is ambiguous."""
         for name, series in self.series.items():
             joint, tally = self.joints[name], self._options.tally
             values = [value.plain for value in series.values() if isinstance(value, JointValue)]
@@ -211,7 +211,7 @@ class JointState:
                 tally.note(f"{far}; poses between go the shorter way", joint.line)
 
 
-_HOLDERS = ("joint", "joints", "position", "positions", "joint_positions")  # before a dot
+_HOLDERS = ("joint", "joints", "position", "positions", "joint_positions")  # prefixes of column names, before a dot
 _UNIT = re.compile(rf"_({'|'.join((*ANGLES, *filter(None, LENGTHS)))})$")
 
 
@@ -275,7 +275,7 @@ class JointSample(NamedTuple):
 def read_joint_file(path: str, joints: Mapping[str, Joint]) -> Iterator[JointSample]:
     """Yield the values in a file, in its order; `path` may be FILE:STATE for a named state.
 
-    joints: those that the file may contain.
+    joints: those of the robot, which columns and keys may name
     Raises FileProblem, FormatError.
     """
     whole, colon, state = path.rpartition(":")
@@ -309,7 +309,10 @@ def read_joint_file(path: str, joints: Mapping[str, Joint]) -> Iterator[JointSam
 
 
 def _of_value(value: Any, path: Path, message: TextMessage, joints: Mapping[str, Joint]) -> Iterator[JointSample]:
-    """Yield the values in a plain value: a JointState, a map, also the only one in a map, or a list of these."""
+    """Yield the joint values in a YAML or JSON value: a JointState message, a map, or a list of these.
+
+    A map of joints may be below a single key.
+    """
     if type(value) is list:
         for index, each in enumerate(value):
             yield from _of_value(each, (*path, index), message, joints)

@@ -130,7 +130,7 @@ class MjcfModel:
         return name
 
     def _take(self, node: Element, inside: _Inside) -> _Inside | None:
-        """Read one element; for a body or frame return the context of its children."""
+        """Read one element; returns the context of its children for a body or frame, else None."""
         if node.tag in ("composite", "flexcomp"):
             self.options.tally.note_each(f"<{node.tag}> is left out: its bodies are made by MuJoCo; {WHOLE}", node.line)
         elif node.tag == "frame":
@@ -284,7 +284,7 @@ def numbers_of(attributes: Attributes, name: str, default: str) -> tuple[float, 
 
 
 def direction(attributes: Attributes, name: str, vector: Sequence[float]) -> Vector:
-    """Return a vector of any length but zero, from an attribute, as a unit one; raises FormatError."""
+    """Return the unit vector along the vector of an attribute; raises FormatError if that is zero."""
     x, y, z = vector
     if quaternion.magnitude(x, y, z, floats) < LEAST:
         raise attributes[name].error(f"{name}: {x:g} {y:g} {z:g} has no direction", name)
@@ -298,12 +298,12 @@ def _turning_z(x: float, y: float, z: float) -> Quaternion:
     return quaternion.between(0.0, 0.0, 1.0, x, y, z, floats)
 
 
-SHOWN_GROUPS = 3  # of geoms; MuJoCo's viewer draws those below
-IN_QPOS = {"floating": 7, "ball": 4}  # numbers of a joint in qpos; the others have one
+SHOWN_GROUPS = 3  # MuJoCo's viewer draws geoms of groups below this
+IN_QPOS = {"floating": 7, "ball": 4}  # numbers of a joint in qpos; joints of other kinds have one
 
 
 def read(file: InputFile, options: Options) -> Iterator[Edge]:
-    """Yield the edges of a model, with joint values from options, default at their references."""
+    """Yield the edges of a model, with joint values from options, by default those of the file (`ref`)."""
     links = MjcfModel(read_xml(file, "mujoco"), options).links.values()
     yield from JointState.of(links, options, file.name).edges(links)
 

@@ -71,10 +71,9 @@ class Joint(NamedTuple):
     """A joint that can move.
 
     kind: one of TURNING or POSED, or prismatic
-    axis: unit, in the frame of the joint; of a planar one the normal of its plane
-    lower, upper: limits in radians or metres, if it has any
-    rest: the default value, of the pose in the file (MJCF's `ref`)
-    rest_pose: the same if the value is a pose
+    axis: unit vector in the frame of the joint; of a planar joint the normal of its plane
+    lower, upper: limits in radians or metres, None for no limit
+    rest, rest_pose: the value, a number or a pose, at the pose in the file (MJCF's `ref`), which is the default
     anchor: the point of its frame about which it rotates
     line: line number in the file
     """
@@ -97,7 +96,7 @@ class Joint(NamedTuple):
 
     @property
     def start(self) -> Value:
-        """Return the default value of the joint; that of a mimic follows a leader at 0."""
+        """Return the default value of the joint; for a mimic that of a leader at 0."""
         if self.mimic:
             return followed(self, JointValue(0.0))
         return self.rest_pose if self.posed else JointValue(self.rest)
@@ -119,7 +118,7 @@ class JointValue(NamedTuple):
 
 
 def motion(joint: Joint, value: Value, xp: Namespace = floats) -> Rigid:
-    """Return the motion of the frame after the joint."""
+    """Return the pose of the frame after the joint in the frame before it, for a joint value."""
     if isinstance(value, JointValue):
         number, degrees = value
         if joint.rest:
@@ -136,7 +135,7 @@ def motion(joint: Joint, value: Value, xp: Namespace = floats) -> Rigid:
 
 
 def _is_at_rest(joint: Joint, value: Value) -> Condition:
-    """Return True, or an array, where a joint does not move anything."""
+    """Return True, or a mask for arrays, where the joint value causes no motion."""
     if not isinstance(value, JointValue):
         return value == rigid.IDENTITY
     at_rest: Condition = value.number == (joint.rest * floats.RADIAN if value.degrees else joint.rest)
@@ -144,13 +143,14 @@ def _is_at_rest(joint: Joint, value: Value) -> Condition:
 
 
 class Link(NamedTuple):
-    """The connection of a frame to its parent; None for a root.
+    """The connection of a frame to its parent.
 
-    origin: the pose before the joints; after: after them
-    joints: those that move it, outermost first
+    parent: None for a root
+    origin, after: poses before and after the joints; parent_from_child = origin * motions * after
+    joints: those that move the frame, outermost first
     rest: its pose with all joints at rest, with exactly the numbers of the file
-    inverted: origin, joints and after lead from the frame to its parent
-    fixed: the name of the fixed joint to its parent, if there is one
+    inverted: origin, joints and after give child_from_parent instead
+    fixed: the name of the fixed joint to its parent, "" without one
     """
 
     parent: str | None
@@ -164,7 +164,7 @@ class Link(NamedTuple):
     fixed: str = ""
 
     def pose(self, values: Sequence[Value], xp: Namespace = floats) -> Rigid:
-        """Return its pose in its parent for joint values; exactly `rest` if no joint has moved."""
+        """Return parent_from_child for joint values; exactly `rest` if no joint has moved."""
         rest = self.rest or _product(self.origin, self.after)
         if not self.joints:
             return rest
@@ -180,7 +180,7 @@ class Link(NamedTuple):
 
 
 def _product(*poses: Rigid) -> Rigid:
-    """Compose poses, the outermost first; the identity changes no bits."""
+    """Return the product of poses, the outermost first; identities are skipped, so that they change no bits."""
     product = rigid.IDENTITY
     for each in poses:
         if each is not rigid.IDENTITY:
@@ -201,9 +201,10 @@ def followed(joint: Joint, leader: Value) -> Value:
 def leaders_first(
     names: Iterable[str], joints: Mapping[str, Joint], valued: Collection[str] = (), file: str = ""
 ) -> dict[str, str]:
-    """Return joints and those that they mimic, leaders first: joint -> leader, "" without one or if it has a value.
+    """Return joint -> the joint that it mimics, for the joints and all that they mimic, leaders first.
 
-    Raises FormatError, in a file, for joints that mimic each other in a circle.
+    valued: joints with a value; these, and joints that mimic no other, have the leader ""
+    Raises FormatError, with the name of the file, for joints that mimic each other in a circle.
     """
     order: dict[str, str] = {}
     for first in names:
@@ -262,7 +263,7 @@ def read_value(joint: Joint, value: Any, source: Source, *, normalize: bool = Fa
 
 # --- solids, as files draw them ---
 
-SIZES = {"box": 3, "cylinder": 2, "capsule": 2, "sphere": 1}  # numbers of each
+SIZES = {"box": 3, "cylinder": 2, "capsule": 2, "sphere": 1}  # shape -> the count of its size's numbers
 SHAPES = (*SIZES, "mesh")
 PARTS = {"size": 3, "radius": 1, "length": 1}  # attributes with the size of a shape -> the count of their numbers
 
@@ -280,7 +281,7 @@ class Solid(NamedTuple):
 
 
 def read_solids(file: InputFile, fmt: str) -> list[Solid]:
-    """Return the solids of a file whose frames were read; [] for formats without solids.  Raises FormatError."""
+    """Return the solids of a file that was read as a tree; [] for formats without solids.  Raises FormatError."""
     read = getattr(import_module(FORMATS[fmt].reader), "read_solids", None)
     return [*read(file)] if read else []
 
@@ -380,7 +381,7 @@ class Chain:
     """
 
     def __init__(self, path: FramePath, links: Mapping[str, Link], joints: Mapping[str, Joint]) -> None:
-        """Find the links from the common ancestor down to either end, topmost first."""
+        """Find the links from the common ancestor down to both ends, topmost first."""
         self._joints = joints
         self._down, self._up = ([links[child] for child in edges] for edges in (path.to_target, path.to_source))
         self._between = [joint.name for link in (*self._down, *self._up) for joint in link.joints]
@@ -391,7 +392,7 @@ class Chain:
         return joint in leaders_first(self._between, self._joints)
 
     def missing(self, valued: Collection[str]) -> list[str]:
-        """Return the joints without a value, neither set nor by mimicking."""
+        """Return the joints that have no value, neither of their own nor through the joint they mimic."""
         order = leaders_first(self._between, self._joints, valued)
         return [name for name, leader in order.items() if not leader and name not in valued]
 
@@ -411,7 +412,7 @@ class Chain:
         return arrays.run(kernel, 7, numbers)
 
     def pose(self, values: Values, xp: Namespace) -> Rigid:
-        """Return base_from_tip for values of the needed joints: all floats, or arrays of one block."""
+        """Return base_from_tip, computed from values of the needed joints: all floats, or arrays of one block."""
         known = dict(values)
         for name, leader in leaders_first(self._between, self._joints, values).items():
             if name not in known:

@@ -75,9 +75,10 @@ class SdfFrame:
     """One frame: of a world, model, link, joint, sensor, or an explicit one.
 
     name: with its scopes, as in the tree; local: as in the file
-    scope: the enclosing model or world; of a world itself
+    scope: the enclosing model or world; for a world itself
     attached_to: the frame that it moves with, unless it is a link
-    pose: as written, in `relative_to`; of `placement`, if it has one
+    pose: as written, relative to `relative_to`
+    placement: for a model with a placement_frame, the frame that has this pose; else None
     """
 
     __slots__ = ("attached_to", "holder", "kind", "local", "name", "placement", "pose", "relative_to", "scope")
@@ -121,7 +122,7 @@ class SdfJoint(NamedTuple):
 
     @property
     def ends(self) -> tuple[SdfFrame, SdfFrame]:
-        """Return the child, and its parent in the tree: the world is always the parent."""
+        """Return the child and its parent in the tree; the world is always the parent."""
         return (self.parent, self.child) if self.child.kind == WORLD else (self.child, self.parent)
 
 
@@ -129,9 +130,9 @@ class SdfTree:
     """All frames of a file, and the joints between them.
 
     all: the frames by their names with scopes
-    names: the names of joints for their values, without scopes if these are unique
-    hung: link -> the joint above it
-    carried: model -> the link above its frame, for models that a joint moves
+    names: frame of a joint -> its name in joint values, without scopes if that is unique
+    hung: link -> the joint that connects it to its parent
+    carried: model -> the link that its frame is attached to, for models that a joint moves
     """
 
     def __init__(self, root: Element, options: Options) -> None:
@@ -143,7 +144,7 @@ class SdfTree:
         self.top = SdfFrame(WORLD, WORLD, None, worlds[0] if worlds else root)
         self.all: dict[str, SdfFrame] = {WORLD: self.top}
         self.sensors: list[SdfFrame] = []
-        parts = root.attribute("version").split(".")  # other words count as the newest version
+        parts = root.attribute("version").split(".")  # anything but numbers counts as the newest version
         self.version = tuple(map(int, parts)) if all(part.isdecimal() for part in parts) else (2,)
         self.included = False
         self._take()
@@ -151,7 +152,7 @@ class SdfTree:
         for frame in [*frames, *self.sensors]:
             self._read(frame)
         self.tree = FrameTree()
-        self.seen: dict[str, dict[str, Rigid]] = {}  # frame -> poses of those below it: keeps long chains linear
+        self.seen: dict[str, dict[str, Rigid]] = {}  # cache: frame -> poses of frames in it; keeps long chains linear
         for frame in frames:
             placed = frame.placement or frame
             if not self.tree.hang(frame.relative_to.name, placed.name, frame.pose):
@@ -205,7 +206,7 @@ class SdfTree:
                         self.sensors.append(SdfFrame("sensor", sensor.required("name"), frame, sensor))
 
     def note(self, holder: Element, message: str) -> None:
-        """Record a warning about an element."""
+        """Record a warning at an element."""
         self.options.tally.note_each(message, holder.line)
 
     def _named(self, holder: Element, scope: SdfFrame) -> SdfFrame:
@@ -250,7 +251,7 @@ class SdfTree:
         return self.find(holder.text, joint.scope, holder, "")
 
     def find(self, name: str, scope: SdfFrame, holder: Element, attribute: str) -> SdfFrame:
-        """Return the frame that a name refers to in a scope.
+        """Return the frame with a name in a scope.
 
         Raises FormatError with the names that exist.
         """
@@ -270,7 +271,7 @@ class SdfTree:
         raise holder.error(f"{message}{alternatives(name, inside, 'frames')}", attribute)
 
     def relative(self, outer: SdfFrame, frame: SdfFrame) -> Rigid:
-        """Return the pose of one frame in another with all joints at rest; unchanged if it was written like that."""
+        """Return the pose of `frame` in `outer` with all joints at rest; as in the file, if it is written there."""
         if frame.relative_to is outer and frame.placement is None:
             return frame.pose
         if outer.relative_to is frame and outer.placement is None:

@@ -44,7 +44,10 @@ _XACRO = f"xacro, not yet URDF; {UNSUPPORTED['xacro'].remedy}"
 
 
 def read(file: InputFile, options: Options, found: list[Any] | None = None) -> Iterator[Edge]:
-    """Yield the edges of a robot, with joint values from options, default 0; `found` receives its description."""
+    """Yield the edges of a robot, with joint values from options, default 0.
+
+    found: receives the result of `describe`
+    """
     frames, links, posture = described = describe(file, options)
     if found is not None:
         found += described
@@ -60,7 +63,7 @@ def _roots(frames: Iterable[str], links: Iterable[Link]) -> list[str]:
 
 
 def describe(file: InputFile, options: Options) -> tuple[dict[str, int], list[Link], JointState]:
-    """Return the frames of a robot with their lines, the links of those with a joint, and the joint values.
+    """Return the frames of a robot with their lines, one Link per joint, and the joint values.
 
     Raises FormatError if it is not URDF; errors in one joint go to `options.report`.
     """
@@ -102,7 +105,7 @@ def describe(file: InputFile, options: Options) -> tuple[dict[str, int], list[Li
 
 
 def _link(element: Element, joints: Mapping[str, tuple[Link, Element]], options: Options) -> Link:
-    """Read one joint, with its axis, limits, and the joint to mimic; raises FormatError."""
+    """Read one joint, with its axis, limits and mimic; raises FormatError."""
     parts: dict[str, Element] = {}
     for part in element.all("origin", "parent", "child", "axis", "limit", "mimic"):
         if parts.setdefault(part.tag, part) is not part:
@@ -183,7 +186,7 @@ def load_robot(path: str | PathLike[str]) -> Robot:
 
 
 def robot_of(file: FrameFile) -> tuple[Robot, JointState]:
-    """Return the robot of a file, and its joint values from the file's answers; otherwise as `load_robot`."""
+    """Return the robot of a file, and the joint values from the file's options; raises as `load_robot` does."""
     if file.format != "urdf":
         file.close()
         raise file.error(f"expected a URDF robot, found {FORMATS[file.format].summary}")
@@ -198,7 +201,7 @@ _ESCAPES = {"&": "&amp;", "<": "&lt;", ">": "&gt;", '"': "&quot;", "\t": "&#9;",
 
 
 def write_tree(tree: Frames, style: Style) -> str:
-    """Return the robot.
+    """Return the tree as a URDF robot.
 
     Raises ValueInvalid for what URDF cannot hold: moving frames, several roots, names with characters not allowed in
     XML.

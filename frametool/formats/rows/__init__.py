@@ -1,1 +1,1 @@
-"""Formats with many rows, of poses or of columns of numbers, read and written block by block."""
+"""Formats with many rows, of poses or of columns of numbers, read and written in blocks of rows."""

@@ -41,11 +41,11 @@ NUMBERS: dict[str, Kind] = {"double": np.dtype("f8"), "float": np.dtype("f4"), "
 NUMBERS |= {f"{sign}int{bits}": np.dtype(f"{sign}int{bits}") for sign in ("", "u") for bits in (8, 16, 32, 64)}
 NO_TIME = "no time: null"
 STRUCTURED = ("bool", "decimal", "list", "large_list", "fixed_size_list", "struct", "map")  # not text
-IS_JSON = {b"ARROW:extension:name": b"arrow.json", b"ARROW:extension:metadata": b""}  # of a column of JSON texts
+IS_JSON = {b"ARROW:extension:name": b"arrow.json", b"ARROW:extension:metadata": b""}  # metadata of a column of JSON
 
 
 def require_pyarrow(what: str, part: str = "") -> Any:
-    """Return the library, or a part of it; raises FileProblem with the reason and the install command."""
+    """Return pyarrow, or a module of it; raises FileProblem with the reason and the install command."""
     try:
         return import_module(f"pyarrow.{part}" if part else "pyarrow")
     except ImportError:
@@ -53,7 +53,7 @@ def require_pyarrow(what: str, part: str = "") -> Any:
 
 
 def kind_of(arrow_type: Any) -> Kind | None:
-    """Return the type of a column's numbers in numpy's notation; None for other columns."""
+    """Return the numpy type of a column's numbers; None for other columns."""
     return NUMBERS.get(str(arrow_type))
 
 
@@ -64,7 +64,7 @@ def is_floating(arrow_type: Any) -> bool:
 
 
 def in_one(column: Any) -> Any:
-    """Return a column as one array, without a copy if it is one."""
+    """Return a column as one array, without a copy if it has one chunk."""
     if not hasattr(column, "chunks"):
         return column
     return column.chunk(0) if column.num_chunks == 1 else column.combine_chunks()
@@ -79,10 +79,10 @@ def nulls_of(column: Any) -> Flags | None:
 
 
 def stamps_of(column: Any, name: str, in_ns: int) -> tuple[Ints, Flags | None, dict[int, str]]:
-    """Read times as nanoseconds: timestamps (UTC if they have no zone), integers, or float seconds.
+    """Convert times to nanoseconds: timestamps (UTC if they have no zone), integers, or float seconds.
 
-    in_ns: as in `column_file.stamps_in`, of integers
-    Returns the times (0 for null), the null mask (None: none), and row -> the reason why a number is not a time.
+    in_ns: as in `column_file.stamps_in`, for integers
+    Returns the times (0 for null), the null mask (None: no nulls), and row -> the reason why a number is not a time.
     Raises ValueInvalid for another type.
     """
     pa = require_pyarrow("an Arrow column")
@@ -105,7 +105,7 @@ def stamps_of(column: Any, name: str, in_ns: int) -> tuple[Ints, Flags | None, d
 class ArrowBatch(column_file.Batch):
     """Rows of a file.
 
-    rows: a RecordBatch; ends_group: whether they are the last of a group of rows that is written as one
+    rows: a RecordBatch; ends_group: True if they are the last of a group of rows, which is written as one
     """
 
     def __init__(self, rows: Any, bytes_read: int, *, ends_group: bool) -> None:
@@ -120,7 +120,7 @@ class ArrowBatch(column_file.Batch):
         return column.to_numpy(zero_copy_only=False).astype(np.float64), nulls_of(column)
 
     def stamps(self, place: int, *, in_ns: int) -> tuple[Ints, dict[int, str]]:
-        """Return timestamps, integers by name, or float seconds as nanoseconds, and row -> reason if it has no time."""
+        """Return timestamps, integers or float seconds as nanoseconds, and row -> reason for rows without a time."""
         stamps, nulls, reasons = stamps_of(self.rows.column(place), self.rows.schema.names[place], in_ns)
         return stamps, reasons | dict.fromkeys([] if nulls is None else np.flatnonzero(nulls).tolist(), NO_TIME)
 
@@ -159,7 +159,7 @@ def _of_json(text: str | None) -> Any:
 
 BEGINNINGS = {b"PAR1": "parquet", b"ARROW1": "arrow"}
 NEW_GROUP = 1 << 20  # rows of a group if the input has none
-HEADROOM, LEAST_ROOM = 3, 1 << 26  # memory for writing a group: this multiple of its size, and these additional bytes
+HEADROOM, LEAST_ROOM = 3, 1 << 26  # memory for writing a group: this multiple of its size, plus these bytes
 NULLS = True  # columns may hold nulls
 AT_ONCE = 1 << 16  # rows of a batch: results stay near the cache
 CODECS = {b"\x04\x22\x4d\x18": "lz4", b"\x28\xb5\x2f\xfd": "zstd"}  # of Arrow's batches, by their magic numbers
@@ -269,7 +269,7 @@ def empty_rows(schema: Any) -> Any:
 
 
 def bytes_of(rows: Any) -> int:
-    """Return the memory size of rows; pyarrow before 22 does not measure views of texts: an estimate."""
+    """Return the size of rows in memory, estimated where pyarrow (before 22, for views of texts) cannot measure it."""
     try:
         return int(rows.nbytes)
     except TypeError:
@@ -277,9 +277,9 @@ def bytes_of(rows: Any) -> int:
 
 
 class Collected(BytesIO):
-    """A file to write to, whose bytes are taken piece by piece."""
+    """A file in memory to write to, whose bytes are taken piece by piece."""
 
-    before = 0  # bytes that were taken
+    before = 0  # number of bytes taken so far
 
     def tell(self) -> int:
         """Return the number of bytes written so far."""
@@ -298,17 +298,20 @@ class Collected(BytesIO):
 
 
 class GroupWriter:
-    """Collects rows until a group is complete: one of Parquet, or a batch of Arrow."""
+    """Collects rows until a group is complete: a row group of Parquet, or a batch of Arrow."""
 
     def __init__(self, fmt: str, columns: Sequence[OutColumn], of_input: Any, how: dict[str, Any]) -> None:
-        """Store the columns of the result, the schema of the input if it has one, and its encoding."""
+        """Store the columns of the output, and make its schema.
+
+        of_input: the schema of the input, None for new rows; how: arguments of pyarrow's writer
+        """
         self.pa = require_pyarrow("Arrow")
         self.format, self.columns, self.how = fmt, columns, how
         self.sink = Collected()
         fields = []
         for column in columns:
             own = [] if column.passed is None else [column.passed]
-            if of_input is not None and not own:  # it may replace an input column
+            if of_input is not None and not own:  # a new column may replace one of the input
                 own = of_input.get_all_field_indices(column.name)
             if own:
                 fields.append(of_input.field(own[0]))
@@ -321,7 +324,7 @@ class GroupWriter:
         self.size = self.count = self.read = 0
 
     def of_rows(self, batch: Any, rows: Ints | None, made: Sequence[Made]) -> bytes:
-        """Return the bytes written once a group of rows is complete.
+        """Add rows, and return the bytes that were written, if a group of rows became complete.
 
         Raises ValueInvalid for a null that the schema does not allow.
         """

@@ -59,11 +59,12 @@ _NOT_FINITE = {"nan": np.nan, "inf": np.inf, "infinity": np.inf}
 class CloudFile(column_file.RecordFile):
     """The points of a file whose header has been read: records, or rows of text.
 
-    at: in text, the positions of its columns among the `cells` numbers of a row; None for records
+    at: in text, the positions of the columns among the `cells` numbers of a row; None for records
     line: the line of the next row of text, from 1
-    behind: the bytes that were read after the last point
-    header: returns the changed header, and everything before the points, for columns and a count; raises ValueInvalid
-    record_with: returns the type of a point with some columns; raises ValueInvalid for what the format cannot hold
+    behind: bytes after the last point that were read with it
+    header: function of columns and a row count that returns the new header and everything before the points; raises
+        ValueInvalid
+    record_with: function of columns that returns the type of a point; raises ValueInvalid for types the format lacks
     """
 
     vectors = NORMALS
@@ -95,7 +96,7 @@ class CloudFile(column_file.RecordFile):
         self.behind = b"".join(blanks)
 
     def _rows_of_text(self, at: Sequence[int]) -> Iterator[TextBatch]:
-        """Yield the rows; raises FormatError for a row of another width, or if the file ends too early."""
+        """Yield the rows; raises FormatError for a row with another number of cells, or if the file ends too early."""
         left = self.count
         for block in read_blocks(self.file.stream) if left else ():  # type: ignore[arg-type]
             cells = split_blank(block, self.cells, comment=b"")
@@ -122,7 +123,10 @@ class CloudFile(column_file.RecordFile):
         yield self.behind
 
     def rewriter(self, columns: Sequence[OutColumn], count: int | None, style: Style) -> column_file.CountedWriter:
-        """Return a writer for a cloud of the same format."""
+        """Return a writer for a cloud of the same format.
+
+        Raises ValueInvalid for other columns in a text cloud.
+        """
         encode: column_file.Encode = partial(encode_text, columns, style)
         own, new = columns[: self.width], columns[self.width :]
         if self.at is None:
@@ -139,9 +143,9 @@ def same_columns(columns: Sequence[OutColumn], width: int) -> bool:
 
 
 def head_lines(file: InputFile, text: list[bytes], last: str) -> Iterator[list[str]]:
-    """Yield the words of a header's lines, which are added to the text; raises FormatError if it does not end.
+    """Yield the words of each line of a header; the lines are appended to `text`.
 
-    last: the line that ends it
+    last: the line that ends the header, for messages; raises FormatError if the file ends before it
     """
     size = sum(map(len, text))
     while True:
@@ -156,16 +160,16 @@ def head_lines(file: InputFile, text: list[bytes], last: str) -> Iterator[list[s
 
 
 def count_in(word: str, what: str, file: InputFile, line: int) -> int:
-    """Read a count of items; raises FormatError, which names them by `what`."""
+    """Parse a count of items; raises FormatError with `what` as their name."""
     if not (word.isascii() and word.isdecimal()) or len(word) > 19 or int(word) > _MOST_POINTS:
         raise file.error(f"{what} is not a count", line)
     return int(word)
 
 
 def misfit_of(codes: Collection[str], column: OutColumn, taken: Collection[str] = ()) -> str:
-    """Return why a format cannot hold a column, "" if it can.
+    """Return the reason why a format cannot hold a column, "" if it can.
 
-    codes: its types in numpy's notation, without byte order; taken: reserved names
+    codes: the format's types in numpy's notation, without byte order; taken: reserved names
     """
     if column.kind is None or column.kind.str[1:] not in codes:
         return f"it has no type for {column.kind}" if column.kind is not None else "it holds numbers"
@@ -181,7 +185,7 @@ def type_in(fmt: str, codes: Mapping[str, Code], column: OutColumn, taken: Colle
 
 
 class TextBatch(column_file.Batch):
-    """Rows of text; a number that is not finite means a missing number."""
+    """Rows of text; a number that is not finite means a missing value."""
 
     def __init__(self, cells: Cells, cloud: CloudFile, at: Sequence[int]) -> None:
         """Store the cells of the next rows of a cloud, and the positions of its columns among them."""
@@ -226,9 +230,9 @@ class TextBatch(column_file.Batch):
 def encode_text(
     columns: Sequence[OutColumn], style: Style, batch: TextBatch, rows: Ints | None, made: Sequence[Made]
 ) -> bytes:
-    """Return rows with new numbers in place of their cells, or after them in further columns.
+    """Return rows of text in which new numbers replace the cells of their columns, or are appended.
 
-    They are the shortest text of their type, or have fixed decimals.
+    Numbers have the fewest digits that identify a value of their type, or fixed decimals.
     """
     cells = batch.cells
     chosen = np.arange(batch.size) if rows is None else rows
@@ -236,7 +240,7 @@ def encode_text(
         return b"" if rows is not None else cells.data[MARGIN:-MARGIN].tobytes()
     lines = cells.rows[chosen]
     at, ends = cells.line_starts[lines], cells.line_ends[lines]
-    if rows is None:  # text between rows, or after the last, belongs to one of them
+    if rows is None:  # text between rows goes with the next one, text after the last row with that row
         at = np.concatenate([[MARGIN], ends[:-1]])
         ends = np.append(ends[:-1], len(cells.data) - MARGIN)
     new, parts = iter(made), list[Spans]()
@@ -278,14 +282,14 @@ LINES = {
     f"types: {', '.join(TYPES)}",
 }
 VERTEX = "vertex"
-OWN_LINES: tuple[list[bytes], ...] = ([b"property"], [b"comment"], [b"obj_info"], [])  # of an element
+OWN_LINES: tuple[list[bytes], ...] = ([b"property"], [b"comment"], [b"obj_info"], [])  # lines that follow an element
 SPLAT = ("rot_1", "rot_2", "rot_3", "rot_0")  # x y z w
 
 
 class PlyElement(NamedTuple):
     """One element of a file.
 
-    instances: their number; line: in the header
+    instances: their number; line: line number in the header
     properties: name -> the type of a value, and for a list the type of its count, else ""
     """
 
@@ -296,7 +300,7 @@ class PlyElement(NamedTuple):
 
     @property
     def lists(self) -> list[str]:
-        """Return the properties that are lists, whose size is not known beforehand."""
+        """Return the names of properties that are lists; their size is not known before the data are read."""
         return [name for name, (_, counted) in self.properties.items() if counted]
 
 
@@ -336,7 +340,10 @@ class PlyFile(CloudFile):
     what = "vertices"
 
     def __init__(self, file: InputFile) -> None:
-        """Read the header and everything before the vertices; raises FormatError, also for lists on the way to them."""
+        """Read the header and everything before the vertices.
+
+        Raises FormatError, also for lists in the vertices or in binary elements before them.
+        """
         self.head, self.order, elements = read_head(file)
         at = next((at for at, each in enumerate(elements) if each.name == VERTEX), None)
         if at is None:
@@ -374,7 +381,10 @@ class PlyFile(CloudFile):
         self.at, self.cells, self.line = range(self.width), self.width, (self.head + self.before).count(b"\n") + 1
 
     def moved_by(self, pose: Components | None) -> None:
-        """Rotate splats by the pose that transforms all points; None: there is no such pose."""
+        """Set the rotation of splats from the pose that transforms all points; warn if it is not applied.
+
+        pose: None if the points do not share one
+        """
         name = self.file.name
         if pose is not None and len(pose) == SCALED and "scale_0" in self.names:
             warn(f"{name}: scale_0 .. scale_2, the sizes of splats, are left as they are: add {log(pose[EXACT]):.9g}")
@@ -410,7 +420,7 @@ class PlyFile(CloudFile):
     def rest(self) -> Iterator[bytes]:
         """Yield everything after the vertices; binary data are copied unchecked.
 
-        Raises FormatError if there are more or fewer lines than the header says.
+        Raises FormatError if the number of lines is not that of the header.
         """
         lines, begun = 0, b""
         for piece in chain((self.behind,), () if self.is_last else column_file.pieces(self.file.stream)):
@@ -452,7 +462,7 @@ def _type_of(column: OutColumn) -> str:
 
 
 def create(columns: Sequence[OutColumn], count: int | None, style: Style) -> column_file.CountedWriter:
-    """Return a writer for new points, with numbers of their own types: an empty file gets other columns."""
+    """Return a writer for new points: a new file with these columns, whose numbers keep their types."""
     empty = b"ply\nformat binary_little_endian 1.0\nelement vertex 0\nend_header\n"
     return PlyFile(InputFile("ply", BytesIO(empty))).rewriter(columns, count, style)
 

@@ -1,12 +1,12 @@
-"""Files of columns of numbers, read without text: the interface of formats, and what their files share.
+"""Binary files of columns of numbers: the interface of the formats, and their common parts.
 
 The module of a format that is read as `arrays` has `open_columns(file) -> ColumnFile`; if it is written,
-`create(columns, count, style) -> ColumnWriter`.  Rows are counted from 1, batches follow one another.
+`create(columns, count, style) -> ColumnWriter`.  Rows are numbered from 1 across batches.
 
 Records in a file have numpy's layout, one field after another.  Headers are checked against the file before data are
 read, memory is allocated or output is written.
 
-One format is nothing but records, and is read and written here, kitti-bin and nuscenes-bin: consecutive points, four or
+Files of kitti-bin and nuscenes-bin are nothing but records, and are read and written here: consecutive points, four or
 five float32 (little-endian) each:
 
     x y z intensity            KITTI, velodyne/000000.bin
@@ -60,9 +60,9 @@ class OutColumn(NamedTuple):
     """A column of the output.
 
     name: "" if columns have no names
-    kind: the type of its numbers; None for texts
-    passed: the index of the unchanged input column; None for a new column
-    longest: the maximum length of a text, if known; is_json: whether texts are JSON
+    kind: the numpy type of its numbers; None for texts
+    passed: the index of the input column that is copied unchanged; None for a new column
+    longest: the maximum length of a text, 0 if unknown; is_json: True if texts are JSON
     """
 
     name: str
@@ -73,9 +73,10 @@ class OutColumn(NamedTuple):
 
 
 class Made(NamedTuple):
-    """The data of a new column: (n,) of its type, or texts; and the mask of missing values (None: none missing).
+    """The data of a new column.
 
-    Missing numbers are nan.
+    values: (n,) of its type, nan for missing numbers; or texts
+    absent: the mask of missing values; None if there are no missing values
     """
 
     values: Any
@@ -86,7 +87,7 @@ class Batch(Protocol):
     """Rows of a file, addressed by the indices of its columns.
 
     size: the number of rows; bytes_read: their size in the file
-    errors: why rows between them could not be read
+    errors: those of rows that could not be read and are left out
     """
 
     size: int
@@ -95,7 +96,7 @@ class Batch(Protocol):
 
     @cached_property
     def lines(self) -> Ints:
-        """Return the line of each row, or its number, from 0."""
+        """Return the line of each row, or its number in the batch, from 0."""
         return np.arange(self.size)
 
     def column(self, place: int) -> Any:
@@ -117,9 +118,9 @@ class Batch(Protocol):
 
 
 def stamps_in(numbers: NDArray[Any], in_ns: int) -> tuple[Ints, Flags, str]:
-    """Return numbers as nanoseconds, the mask of those that are not times, and the reason.
+    """Convert numbers to nanoseconds; returns them, the mask of numbers that are not times, and the reason.
 
-    in_ns: nanoseconds per unit, of integers alone; 0 for seconds, or what the size of the first integer implies.
+    in_ns: nanoseconds per unit of integers; 0: seconds, or for integers the unit that the first one's size implies
     A float of seconds has the value of its shortest decimal text, as in a table of text.
     """
     if numbers.dtype.kind not in WHOLE:
@@ -138,7 +139,7 @@ class ColumnWriter(Protocol):
     """Writes rows batch by batch."""
 
     def of_rows(self, batch: Batch | None, rows: Ints | None, made: Sequence[Made]) -> bytes | memoryview:
-        """Return the bytes for rows of a batch (None: all), with the new data of each.
+        """Return the bytes for rows of a batch (None: all), with the new data of each new column.
 
         batch: None if no column is copied from the input.
         """
@@ -150,11 +151,11 @@ class ColumnWriter(Protocol):
 class ColumnFile(Protocol):
     """An opened file: its columns are known, its rows are not read yet.
 
-    names: of the columns; None if they have none; width: their number
-    kinds: the types of their numbers; None for texts and everything else
-    vectors: columns of vectors that are rotated with the points, such as normals
-    gaps: a number that is not finite means a missing point; otherwise its row is bad
-    count: the number of rows, if the file states it
+    names: of the columns; None if they have no names; width: their number
+    kinds: the numpy types of their numbers; None for texts and everything else
+    vectors: names of columns with vectors that are rotated with the points, such as normals
+    gaps: True: a number that is not finite means a missing point; False: its row is invalid
+    count: the number of rows; None if the file does not state it
     """
 
     names: tuple[str, ...] | None
@@ -165,9 +166,9 @@ class ColumnFile(Protocol):
     count: int | None = None
 
     def moved_by(self, pose: Components | None) -> None:
-        """Transform data about all points by the pose that transforms all of them, before any is read.
+        """Transform data of all points, such as the sensor's pose or rotations of splats, before rows are read.
 
-        Such as the pose of the sensor, or rotations of splats; None: there is no such pose.
+        pose: the pose that transforms all points; None if they do not share one
         """
         del pose
 
@@ -175,11 +176,11 @@ class ColumnFile(Protocol):
         """Yield the rows; raises FormatError if the file ends too early."""
 
     def nothing(self) -> Batch:
-        """Return an empty batch."""
+        """Return a batch without rows."""
         return StructuredBatch(np.zeros(0, record_of(kind or "U1" for kind in self.kinds)))
 
     def rewriter(self, columns: Sequence[OutColumn], count: int | None, style: Style) -> ColumnWriter:
-        """Return a writer for a file of the same format, with everything outside of the columns unchanged.
+        """Return a writer for a file of the same format that preserves everything outside of the columns.
 
         count: the number of rows; None if it is known only at the end
         """
@@ -201,7 +202,7 @@ class StructuredBatch(Batch):
 
 
 def record_of(kinds: Iterable[Any]) -> Kind:
-    """Return the type of records with a value of each type, in this order."""
+    """Return the type of records with one value of each type, in this order."""
     return np.dtype([(f"{place}", kind) for place, kind in enumerate(kinds)])
 
 
@@ -211,7 +212,7 @@ def is_number(kind: Kind | None) -> bool:
 
 
 def plain_value(value: Any) -> Any:
-    """Return a library's value in JSON terms; values unknown to JSON as text."""
+    """Convert a library's value to JSON values; types that JSON lacks become text."""
     if isinstance(value, dict):
         return {str(key): plain_value(each) for key, each in value.items()}
     if isinstance(value, (list, tuple)):
@@ -250,7 +251,10 @@ class RecordFile(ColumnFile):
         self.kinds = [kind if is_number(kind) else None for kind in kinds]
 
     def batches(self) -> Iterator[Batch]:
-        """Yield the rows; memory grows with the data, not with the stated count."""
+        """Yield the rows; memory grows with the data, not with the stated count.
+
+        Raises FormatError if rows are missing.
+        """
         size, count = rows_of_batch(self.record.itemsize), self.count
         for done in range(0, count, size):
             data = bytearray(min(size, count - done) * self.record.itemsize)
@@ -262,7 +266,7 @@ class RecordFile(ColumnFile):
 
 
 def rows_of_batch(size: int) -> int:
-    """Return how many records of this size are read at once."""
+    """Return how many records of `size` bytes are read at once."""
     return max(1, min(MOST_ROWS, BATCH_BYTES // max(size, 1)))
 
 
@@ -311,7 +315,10 @@ def pieces(stream: BinaryIO) -> Iterator[bytes]:
 
 
 def read_exactly(file: InputFile, size: int, what: str) -> bytes:
-    """Read this many bytes, with memory growing with the data; raises FormatError if there are fewer."""
+    """Read `size` bytes; memory grows with the data.  Raises FormatError if there are fewer.
+
+    what: name of the data, for the message
+    """
     found: list[bytes] = []
     missing = size
     while missing and (piece := file.stream.read(min(missing, PIECE))):
@@ -323,14 +330,14 @@ def read_exactly(file: InputFile, size: int, what: str) -> bytes:
 
 
 def temporary_file(owner: object) -> Any:
-    """Return an unnamed file that is closed with its owner."""
+    """Return an unnamed file that is closed when its owner is deleted."""
     file = TemporaryFile()  # noqa: SIM115 - closed with its owner
     finalize(owner, file.close)
     return file
 
 
 def seekable(file: InputFile, owner: object) -> Any:
-    """Return the stream of a file, with random access; for a pipe a copy, which is closed with its owner."""
+    """Return the stream of a file with random access; for a pipe a copy that is closed when its owner is deleted."""
     if bytes_left(file.stream) is not None:
         return file.stream
     copy = temporary_file(owner)
@@ -343,16 +350,17 @@ def seekable(file: InputFile, owner: object) -> Any:
 
 
 class CountedWriter:
-    """Writes a header with the number of rows, the rows, and the rest of the file."""
+    """Writes a header with the number of rows, the rows, and the bytes after them."""
 
     def __init__(
         self, encode: Encode, head: Callable[[int], bytes], count: int | None,
         behind: Callable[[], Iterable[bytes]] = tuple,
     ) -> None:  # fmt: skip
-        """Store the functions that encode the rows of a batch, with their new data.
+        """Store the functions that encode rows, header and end.
 
+        encode: returns the bytes of rows of a batch, with their new data
         head: returns the header for a number of rows; behind: yields the bytes after the rows
-        count: the number of rows; None if it is known only at the end: rows are kept in a file until then.
+        count: the number of rows; None if it is known only at the end: until then the rows are kept in a temporary file
         """
         self.encode, self.head, self.count, self.behind = encode, head, count, behind
         self.written = 0
@@ -371,7 +379,7 @@ class CountedWriter:
         return head + data if head else data
 
     def end(self) -> Iterator[bytes]:
-        """Yield the bytes after the last batch; all bytes, if the rows had to be counted first."""
+        """Yield the bytes after the last batch, or all bytes if the rows had to be counted first."""
         if not self.begun:
             yield self.head(self.written)
         if self.waiting is not None:
@@ -385,7 +393,8 @@ def encode_records(
 ) -> bytes | memoryview:
     """Return rows as records: new data are written into their fields, the others are copied.
 
-    kind: of the records, with a field for each column.  Without new columns they are changed in place.
+    kind: type of the records, with a field for each column; if it is that of the batch, its records are changed in
+        place
     """
     of_input = batch if batch is None or rows is None else StructuredBatch(batch.rows[rows])
     if of_input is not None and of_input.rows.dtype == kind:
@@ -440,7 +449,7 @@ class BinCloud(RecordFile):
             yield batch
 
     def rewriter(self, columns: Sequence[OutColumn], count: int | None, style: Style) -> ColumnWriter:
-        """Return a writer for a cloud of either format."""
+        """Return a writer for a cloud without a header, of either format."""
         return create(columns, count, style)
 
 

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
 
-PLAIN = ("point", "vector", "xyz")  # whose numbers are x, y, z
+PLAIN = ("point", "vector", "xyz")  # keys whose numbers are x, y, z
 SIX = ("twist", "wrench")
 HALVES = ("linear", "angular", "force", "torque")
 _CELL = re.compile(r'(?:[^\S\n]*"((?:[^"]|"")*)"\s*|([^,]*))(?:,|$)')
@@ -46,7 +46,7 @@ def split_line(line: str) -> list[LineCell]:
 
 
 def quoted(text: str) -> str:
-    """Write a cell, in quotes if necessary."""
+    """Return the text of a cell, in quotes if necessary."""
     is_split = "," in text or '"' in text or "\r" in text or "\n" in text
     return '"' + text.replace('"', '""') + '"' if is_split else text
 
@@ -84,10 +84,10 @@ def cells_of(value: Result | dict[str, Any], style: Style) -> dict[str, Any]:
 
 
 def _pose_cells(result: Result, style: Style) -> dict[str, Any]:
-    """Return a pose's cells by column name.
+    """Return the cells of a pose by column name.
 
-    An extra that a notation contains (the angle of an axis) is omitted; raises ValueInvalid if two
-    notations need one column.
+    An extra that a representation includes (the angle of an axis) is omitted.  Raises ValueInvalid if two
+    representations need the same column.
     """
     pose, extras = result.pose, dict[str, Any]()
     names = ("name", pose.name), ("parent", pose.parent)

@@ -1,8 +1,8 @@
 """LAS and LAZ, laser scans, with the libraries laspy and lazrs, the extra `frametool[las]`.
 
-x y z are 32-bit integers, times a scale, plus an offset.  The scale is preserved; the offset is chosen again, whole
-metres near the first points that are written; points that do not fit are an error.  All other dimensions, VLRs and
-EVLRs are preserved, including a coordinate system, with a warning.
+x y z are 32-bit integers, times a scale, plus an offset.  The scale is preserved; a new offset is chosen, whole metres
+near the first points that are written; points that do not fit are an error.  All other dimensions, VLRs and EVLRs are
+preserved, including a coordinate system, with a warning.
 """
 
 from __future__ import annotations
@@ -35,13 +35,13 @@ COLOURS = {"red", "green", "blue"}
 LAZ = "laz"
 EXTRA = {f"{letter}{size}" for letter in "iu" for size in (1, 2, 4, 8)} | {"f4", "f8"}  # types of other dimensions
 LONGEST_NAME = 32
-RECORDS = (("VLRs", 100, 54), ("EVLRs", 243, 60))  # where the header has their number, and the minimum size of each
-MINOR_AT, LEAST_HEAD = 25, 375  # of the version, 1.4 has EVLRs; bytes of its header
-PACKED_AT, PACKED = 104, b"\x80"  # the byte that marks compression, and its lowest such value
+RECORDS = (("VLRs", 100, 54), ("EVLRs", 243, 60))  # position of their count in the header, and minimum size of each
+MINOR_AT, LEAST_HEAD = 25, 375  # position of the minor version (from 1.4 there are EVLRs); size of the header of 1.4
+PACKED_AT, PACKED = 104, b"\x80"  # position of the byte that marks compression; its least value in compressed files
 
 
 def _laspy(name: str, *, packed: bool = False) -> Any:
-    """Import the library, and keep it from printing; raises FileProblem if it, or decompression, is missing."""
+    """Import laspy and silence its log; raises FileProblem if it is missing, or lazrs if `packed`."""
     try:
         laspy = import_module("laspy")  # it ships no types
         if packed:
@@ -61,7 +61,7 @@ REFUSED = "it cannot be written as las: {}"
 
 
 class _Clipped:
-    """A file wrapper that never reads more than exists: the library allocates what a header states before it reads."""
+    """A file wrapper that reads no more than the file has: laspy allocates what a header states before it reads."""
 
     def __init__(self, stream: Any, size: int) -> None:
         """Store a seekable stream and its size."""
@@ -124,7 +124,7 @@ class LasFile(column_file.ColumnFile):
         self.kinds = [each.dtype if each.ndim == 1 else None for each in kinds]  # None: several values
 
     def moved_by(self, pose: Components | None) -> None:
-        """Warn that a coordinate system is preserved."""
+        """Warn if the file states a coordinate system, which is preserved."""
         del pose
         if any(type(vlr).__name__.startswith(("Wkt", "Geo")) for vlr in self.header.vlrs):
             warn(f"{self.file.name}: its coordinate system (CRS) is kept as it is; is it still that of the points?")
@@ -149,22 +149,22 @@ class LasFile(column_file.ColumnFile):
         return LasWriter(deepcopy(self.header), columns, packed=packed, name=self.file.name)
 
 
-MOST_PACKED = 1 << 16  # points in a packed byte: far more than any encoder reaches
+MOST_PACKED = 1 << 16  # points per compressed byte: far more than any encoder reaches
 
 
 class LasWriter:
-    """Writes points to a seekable file, because the header needs it, and yields its bytes at the end."""
+    """Writes points to a temporary file, because the header needs random access, and yields its bytes at the end."""
 
     def __init__(self, header: Any, columns: Sequence[OutColumn], *, packed: bool, name: str = "las") -> None:
-        """Store a header; its offsets are chosen with the first points."""
+        """Store a header; its offsets are chosen when the first points are written."""
         self.header, self.columns, self.packed, self.name = header, columns, packed, name
         self.kept = column_file.temporary_file(self)
         self.writer: Any = None
         self.count = 0
-        self.left_out = 0  # points without numbers
+        self.left_out = 0  # number of points without coordinates
 
     def of_rows(self, batch: Any, rows: Ints | None, made: Sequence[Made]) -> bytes:
-        """Write the points of a batch that have numbers; nothing is returned yet."""
+        """Write the points of a batch that have coordinates; the bytes are returned by `end`."""
         columns = [each for each in self.columns if each.passed is None]
         new = {column.name: np.asarray(each.values) for column, each in zip(columns, made, strict=True)}
         new |= {name: new[name].astype(np.float64) for name in XYZ if name in new}
@@ -193,7 +193,7 @@ class LasWriter:
             self.writer = writer(self.kept, self.header, do_compress=self.packed, closefd=False)
 
     def _points(self, batch: LasBatch | None, rows: Ints | None, new: dict[str, Any]) -> Any:
-        """Return points as a record of the library; raises FormatError for numbers that do not fit."""
+        """Return points as a record of laspy; raises FormatError for numbers that do not fit."""
         kind = _laspy(self.name).ScaleAwarePointRecord
         if batch is None:
             points = kind.zeros(len(new["x"]), header=self.header)
@@ -239,7 +239,7 @@ class LasWriter:
 
 
 def misfit(column: OutColumn) -> str:
-    """Return why LAS cannot hold a column, "" if it can."""
+    """Return the reason why LAS cannot hold a column, "" if it can."""
     if column.name in STORED or len(column.name.encode()) > LONGEST_NAME:
         return f"its names have at most {LONGEST_NAME} bytes, and {', '.join(STORED)} have a meaning"
     kind = None if column.kind is None else column.kind.str[1:]
@@ -247,7 +247,7 @@ def misfit(column: OutColumn) -> str:
 
 
 def create(columns: Sequence[OutColumn], _count: int | None, style: Style) -> LasWriter:
-    """Return a writer for new points: LAS 1.4, columns that are not dimensions of it as extra bytes."""
+    """Return a writer for new points: LAS 1.4, with extra bytes for columns that are not dimensions of it."""
     laspy = _laspy(style.format)
     names = {column.name for column in columns}
     if not names >= set(XYZ):

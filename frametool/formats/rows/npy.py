@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 MAGIC = b"\x93NUMPY"
 MOST_HEADER = 1 << 20
 MOST_COLUMNS, MOST_BYTES = 1 << 16, 1 << 24  # of a row
-LONGEST_TEXT = 64  # characters of a new name; numpy has fixed-size texts
+LONGEST_TEXT = 64  # characters of a new text if its length is unknown: numpy's texts have a fixed size
 ALIGNED = 64  # bytes, as numpy pads its headers
 UTF8 = b"\x03"  # version of headers with names that are not ASCII
 
@@ -82,9 +82,9 @@ class NpyFile(column_file.RecordFile):
 def _writer(
     columns: Sequence[OutColumn], of_input: Kind, count: int | None, shape: tuple[int, ...] | None
 ) -> column_file.CountedWriter:
-    """Return a writer for an array: without fields if the input had none and all columns are of one type.
+    """Return a writer for an array: without fields if the input has none and all columns have one type.
 
-    of_input: the type of the input's records; shape: of a row without fields
+    of_input: the type of the input's records; shape: of a row of an input without fields, None for one with fields
     """
     made = [column.kind or np.dtype(f"U{column.longest or LONGEST_TEXT}") for column in columns]
     fields = [

@@ -72,7 +72,7 @@ class PcdField(NamedTuple):
 
 
 def layout_of(fields: Sequence[PcdField]) -> tuple[list[str], list[int], Kind]:
-    """Return the columns of fields, one per value: names, cells in a row, and the type of a point.
+    """Return the columns of fields, one per value: their names, their positions in a row, and the type of a point.
 
     Padding is not a column, but occupies bytes.
     """
@@ -90,7 +90,7 @@ def layout_of(fields: Sequence[PcdField]) -> tuple[list[str], list[int], Kind]:
 
 
 def viewpoint_words(pose: Rigid) -> str:
-    """Return the pose of a sensor as the values of VIEWPOINT: tx ty tz qw qx qy qz."""
+    """Format the pose of a sensor as the values of VIEWPOINT: tx ty tz qw qx qy qz."""
     tx, ty, tz, x, y, z, w = pose
     x, y, z, w = quaternion.from_quaternion(x, y, z, w, floats)
     return " ".join(repr(each + 0.0) for each in (tx, ty, tz, w, x, y, z))
@@ -100,7 +100,7 @@ MOST = 88  # maximum expansion of one packed byte: three make up to 264
 
 
 def unpack(packed: bytes, size: int) -> bytearray:
-    """Return the `size` bytes that were packed with LZF.
+    """Decompress data of LZF to `size` bytes.
 
     A control byte below 32 is a number of literal bytes minus one.  Otherwise its upper three bits are a length
     minus two (seven: the next byte is added), its lower five the upper bits of a distance minus one, whose lower eight
@@ -148,8 +148,8 @@ class PcdFile(CloudFile):
     """A cloud whose points are read in batches.
 
     text: the header byte for byte, including its last line end
-    words: the values of each key; lines: the number of its line
-    sensor: the seven numbers of VIEWPOINT, if present.  viewpoint: their words, once they are transformed
+    words: the values of each key; lines: the line number of each key
+    sensor: the seven numbers of VIEWPOINT, None without it; viewpoint: the new values as text, "" if unchanged
     grid: the new WIDTH and HEIGHT if the number of points changes; None for a single row
     """
 
@@ -206,7 +206,7 @@ class PcdFile(CloudFile):
             self.line = self.text.count(b"\n") + 1
 
     def _problem(self, key: str, message: str) -> FormatError:
-        """Return the error for a line."""
+        """Return an error at the line of a key."""
         return self.file.error(message, self.lines.get(key, 0))
 
     def _read_fields(self) -> tuple[PcdField, ...]:
@@ -234,7 +234,10 @@ class PcdFile(CloudFile):
         return tuple(fields)
 
     def moved_by(self, pose: Components | None) -> None:
-        """Transform VIEWPOINT by the pose that transforms all points; None: there is no such pose."""
+        """Transform VIEWPOINT by the pose that transforms all points; with a warning if it is left unchanged.
+
+        pose: None if the points do not share one
+        """
         if self.sensor is None:
             return
         name = self.file.name
@@ -286,9 +289,9 @@ class PcdFile(CloudFile):
             yield column_file.StructuredBatch(rows)
 
     def _fields_of(self, columns: Sequence[OutColumn]) -> tuple[PcdField, ...]:
-        """Return the fields of an output: those of the input with new ones after them, or one for each column.
+        """Return the fields of an output: the input's and new ones, or one per column if the input's columns change.
 
-        Raises ValueInvalid for what PCD cannot hold.
+        Raises ValueInvalid for types that PCD lacks.
         """
         known = self.fields if same_columns(columns[: self.width], self.width) else ()
         new = columns[self.width * bool(known) :]
@@ -299,7 +302,7 @@ class PcdFile(CloudFile):
         return layout_of(self._fields_of(columns))[2]
 
     def header(self, columns: Sequence[OutColumn], count: int) -> bytes:
-        """Return the header with changes."""
+        """Return the header with new values; everything else is unchanged."""
         fields = self._fields_of(columns)
         words = {"VIEWPOINT": self.viewpoint} if self.viewpoint else {}
         if self.data == "binary_compressed":
@@ -322,9 +325,9 @@ def create(
     columns: Sequence[OutColumn], count: int | None, style: Style, *, grid: tuple[int, int] | None = None,
     sensor: Rigid | None = None,
 ) -> column_file.CountedWriter:  # fmt: skip
-    """Return a writer for new points, with numbers of their own types: an empty file gets other fields.
+    """Return a writer for new points: a new file with these columns, whose numbers keep their types.
 
-    grid: the number of points per row, and of rows; sensor: its pose among the points
+    grid: the number of points per row, and of rows; sensor: the sensor's pose in the frame of the points
     """
     file = PcdFile(InputFile("pcd", BytesIO(EMPTY)))
     file.fields, file.grid, file.viewpoint = (), grid, viewpoint_words(sensor) if sensor else ""

@@ -52,10 +52,10 @@ if TYPE_CHECKING:
     from frametool.grammar.result import Style
 
 
-HALF_TURN = (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)  # about x: between optical axes and those of OpenGL
+HALF_TURN = (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)  # about x: converts optical axes to those of OpenGL and back
 MOST_NAMED = 8
-IMAGE = "image"  # the extra that names an image
-NUMBER = "number"  # the extra with the number of a pose in the same format
+IMAGE = "image"  # key of the extra with the name of an image
+NUMBER = "number"  # key of the extra with the number of a pose in the file
 
 
 class Numbers(NamedTuple):
@@ -66,7 +66,7 @@ class Numbers(NamedTuple):
 
 
 class RowForm(NamedTuple):
-    """The text of one pose.
+    """How a format writes one pose.
 
     row: constant text, `Numbers`, and other fields of a pose: `seconds`, `nanoseconds`, `number` (counted from
         `first`), `image` (the name of its image, else its seconds)
@@ -85,7 +85,10 @@ class RowForm(NamedTuple):
 
 
 def turned(style: Style, pose: Components) -> Components:
-    """Convert the axes of a camera, also as reference frame, to those of the format if both are known."""
+    """Convert a pose from the camera's axes to those of the format, if both are known.
+
+    The camera is the body, or also the reference frame (`style.in_camera`).
+    """
     if not is_turned(style):
         return pose
     tx, ty, tz, x, y, z, w = pose
@@ -94,13 +97,13 @@ def turned(style: Style, pose: Components) -> Components:
 
 
 def is_turned(style: Style) -> bool:
-    """Return True if the axes of a camera differ from those of the format it is written in."""
+    """Return True if the camera's axes are known and differ from those of the output format."""
     axes = FORMATS[style.format].rows.axes if style.format in FORMATS else ""
     return bool(axes and style.axes and axes != style.axes)
 
 
 def image_name(image: str | None, stamp_ns: int) -> str:
-    """Return the name of an image, without characters that JSON and rows cannot hold; else its stamp."""
+    """Return the name of an image without characters that JSON and rows cannot hold, or its stamp if it has no name."""
     if image is None:
         return format_stamp(stamp_ns)
     return "".join(letter for letter in image if letter.isprintable() and letter not in '"\\')
@@ -137,7 +140,7 @@ ROWS = {
 
 
 def rows_of(spec: str) -> RowForm | None:
-    """Return how all poses are written in a format; None if each result has a text of its own."""
+    """Return how a format writes poses as rows; None if it writes each result as a text of its own."""
     known: dict[str, RowForm] = getattr(import_module(FORMATS[spec].writer), "ROWS", {})
     return known.get(spec)
 
@@ -146,7 +149,7 @@ def rows_of(spec: str) -> RowForm | None:
 
 
 def describe(options: Options, spec: Rows, count: int, *, named: bool = True) -> None:
-    """Record the assumptions about a trajectory, to be reported with the name of its file."""
+    """Record the assumptions about a trajectory; they are reported with the name of its file."""
     parent, child = options.answers.names(*spec.frames)
     assumed = []
     if named and not options.answers.frames:
@@ -172,14 +175,14 @@ class StampFile:
                     raise FormatError(str(error), source=path, line=number) from None
 
     def between(self, begin: int, end: int) -> list[int]:
-        """Return the times of poses, counted from 0."""
+        """Return the stamps of poses begin to end, counted from 0; raises FormatError if there are too few."""
         if end > len(self.stamps):
             message = f"{len(self.stamps)} times are too few for the poses; one a line is wanted"
             raise FormatError(message, source=self.path)
         return self.stamps[begin:end]
 
     def finish(self, count: int, name: str) -> None:
-        """Check that there was one time per pose."""
+        """Raise FormatError if the number of stamps is not that of the poses."""
         if count != len(self.stamps):
             raise FormatError(f"{len(self.stamps)} times for the {count} poses of {name}", source=self.path)
 
@@ -187,7 +190,7 @@ class StampFile:
 # --- lists of poses ---
 
 BLOCK = 1 << 12  # poses
-NUMBERED = 1 << 33  # above this, a number times a second exceeds a stamp
+NUMBERED = 1 << 33  # larger numbers do not fit a stamp as seconds
 
 
 class Written(NamedTuple):
@@ -209,7 +212,10 @@ class Written(NamedTuple):
 
 
 class PoseBlock(NamedTuple):
-    """Checked poses of a body in the world: tx, ty, tz, x, y, z, w, arrays of n; int64 of n; and as written."""
+    """Checked poses of a body in the world.
+
+    poses: tx, ty, tz, x, y, z, w, arrays (n,); stamps_ns: int64 (n,); rows: the poses as written
+    """
 
     poses: Components
     stamps_ns: Any
@@ -217,12 +223,12 @@ class PoseBlock(NamedTuple):
 
 
 def form_of(file: InputFile, options: Options) -> Rows:
-    """Return the meaning of the poses of a file."""
+    """Return how the poses of a file are read; edges of g2o have the default reading."""
     return EDGES if file.format == "g2o" and options.answers.edges else FORMATS[file.format].rows
 
 
 def read(file: InputFile, options: Options) -> Iterator[EdgeColumns]:
-    """Yield the poses of a file, of one frame; assumptions are reported with the file's name."""
+    """Yield the poses of a file as samples of one frame; assumptions are recorded."""
     spec = FORMATS[file.format].rows
     parent, child = options.answers.names(*spec.frames)
     for block in blocks(file, options):
@@ -234,9 +240,9 @@ def read(file: InputFile, options: Options) -> Iterator[EdgeColumns]:
 
 
 def blocks(file: InputFile, options: Options, *, named: bool = True) -> Iterator[PoseBlock]:
-    """Yield the poses of a file, checked, block by block.
+    """Yield the poses of a file, checked, in blocks.
 
-    named: the two frames have the names of the format or --frames, with a note
+    named: the frames have the names of the format or of --frames, which is recorded as an assumption
     Raises or reports FormatError with the place of an invalid rotation.
     """
     import numpy as np
@@ -278,14 +284,14 @@ def text_lines(file: InputFile) -> Iterator[tuple[int, str]]:
 
 
 def whole_in(file: InputFile, line: int, word: str, what: str) -> int:
-    """Read a word as an integer; raises FormatError, which names it by `what`."""
+    """Parse a word as an integer; raises FormatError with `what` as its name."""
     if not re.fullmatch("[0-9]{1,18}", word):
         raise file.error(f"expected {what}, a whole number, found {shown(word)}", line)
     return int(word)
 
 
 def numbers_in(file: InputFile, line: int, words: Sequence[str]) -> list[float]:
-    """Read the words of a line as numbers; raises FormatError."""
+    """Parse the words of a line as numbers; raises FormatError."""
     try:
         return [parse_number(word) for word in words]
     except ValueInvalid as error:
@@ -303,7 +309,7 @@ def _colmap(file: InputFile, _options: Options) -> Iterator[Written]:
     """Yield the poses of images.txt, or of frames.txt, as written."""
     comments, lines = True, text_lines(file)
     of_frames = False
-    numbered = set[bool]()  # True: the name of an image begins with a number and a space; False: another one
+    numbered = set[bool]()  # True if the name of an image begins with a number and a space
     for line, text in lines:
         bare = text.strip()
         if not bare or bare.startswith("#"):
@@ -346,7 +352,7 @@ INFORMATION = {IN_SPACE: 21, IN_PLANE: 6}  # numbers after an edge
 
 
 def _g2o(file: InputFile, options: Options) -> Iterator[Written]:
-    """Yield the vertices of a pose graph as written, or its edges."""
+    """Yield the vertices of a pose graph as written, or with --edges its edges."""
     edges = options.answers.edges
     kinds, others = (MEASURED, VERTICES) if edges else (VERTICES, MEASURED)
     only_others = 0
@@ -401,7 +407,7 @@ def _nerf(file: InputFile, options: Options) -> Iterator[Written]:
 
 
 def _nerf_pose(entry: Any, index: int) -> Written:
-    """Read one of the frames."""
+    """Read one entry of `frames`."""
     frame = as_mapping(entry, "a frame {file_path, transform_matrix}")
     matrix = frame.get(MATRIX)
     if type(matrix) is not list or len(matrix) not in (3, 4):

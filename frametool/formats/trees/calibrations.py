@@ -113,7 +113,7 @@ def _handeye(value: Any, reading: Reading) -> Iterator[Edge]:
 
 
 def _read_named(file: InputFile, options: Options) -> Iterator[Edge]:
-    """Yield one edge per name of handwritten extrinsics."""
+    """Yield one edge per name of extrinsics written by hand."""
     frames = options.answers.frames
     base = options.answers.names("base")[0]
     in_base, with_parent, left = list[bool](), list[bool](), dict[str, None]()  # for each pose; keys left out
@@ -152,7 +152,10 @@ def _read_named(file: InputFile, options: Options) -> Iterator[Edge]:
 def _entry(
     name: str | int, entry: Any, reading: Reading, options: Options, left: dict[str, None]
 ) -> tuple[Rigid, Meaning]:
-    """Read one pose and its meaning, with `is_stated` False if only its own name is known; raises Misfit."""
+    """Read one pose and its meaning, with `is_stated` False if only the name of the entry is known; raises Misfit.
+
+    name: key of the entry, or its index in a list; left: receives the texts that are not part of the pose
+    """
     if type(entry) is list:
         entry = {"value": entry}
     fields = as_mapping(entry, "a pose as {x: .., y: .., z: .., roll: .., pitch: .., yaw: ..}")
@@ -168,7 +171,7 @@ def _entry(
     if not child:
         accepted = f"{', '.join(CHILDREN)}; of its parent: {', '.join(PARENTS)}"
         raise Misfit(f"missing child; in a list an entry names its frame; keys: {accepted}")
-    for key, value in [*fields.items()]:  # texts, such as a topic or a model, but no misspelt number
+    for key, value in [*fields.items()]:  # leave out texts, such as a topic or a model, but no misspelt number
         if key not in WORDS and type(value) is str and re.match(r"[-+.]*\d", value) is None:
             left[key] = fields.pop(key)
     read = read_loose_pose(fields, reading, order=options.answers.order)
@@ -193,7 +196,7 @@ def _entry(
 
 
 def write_tree(tree: Frames, style: Style) -> str:
-    """Return the tree as in Autoware or easy_handeye, or by names; raises ValueInvalid for trees that do not fit."""
+    """Return the tree in the format of Autoware, easy_handeye, or by names; raises ValueInvalid if it does not fit."""
     edges = static_edges(tree, style.format)
     if style.format == "named":
         text = ""

@@ -4,8 +4,8 @@ r"""Drawings of trees for graphviz (dot) and mermaid: one node per frame, an arr
     n0["base"] -->|"xyz 0.1 0.0 1.2<br>rpy 0.0 15.0 0.0 deg"| n1["camera"]             mermaid
 
 Metres and degrees.  In graphviz, moving frames are drawn as ROS's view_frames does: parents, rates and time spans.
-Graphviz can also be read: an arrow goes from parent to child; there are no poses.  Nor are there in the listing of
-tf2's `all_frames_as_yaml`; names are not quoted, a blank follows each, stamps have three decimals:
+Graphviz can also be read: an arrow goes from parent to child; there are no poses.  The listing of
+tf2's `all_frames_as_yaml` has no poses either; names are not quoted, a blank follows each, stamps have three decimals:
 
     laser:
       parent: 'base_link'
@@ -37,7 +37,7 @@ _FACTS = (r"Average rate:\s*([\d.]+)", r"Buffer length:\s*([\d.]+)", r"Most rece
 
 
 def read(file: InputFile, options: Options) -> Iterator[Edge]:
-    """Yield the frames and edges of a digraph or a listing; their rates, or labels, are recorded in the tally."""
+    """Yield the frames and edges of a digraph or a listing; rates, or labels, are recorded in `options.tally.drawn`."""
     if file.format == "tf2":
         for entry, line in _with_lines(r"(?m)^(\S.*?):[ \t]*\r?\n((?:[ \t]+\S.*(?:\n|\Z))+)", file.text):
             listed = dict(re.findall(r"(?m)^\s*(\w+):[ \t]*(.*?)\s*$", entry[2]))
@@ -65,14 +65,14 @@ def read(file: InputFile, options: Options) -> Iterator[Edge]:
 
 
 def _motion(rate: float, length: float, newest: float) -> str:
-    """Return a short description of an edge's motion from tf2's listing: hertz, and seconds."""
+    """Describe the motion of an edge from tf2's numbers: hertz, and seconds."""
     if length > 0.0:
         return f"{rate:.4g} Hz over {length:.4g} s"
     return f"one at {newest:.9g} s" if newest else "static"
 
 
 def _with_lines(pattern: str, text: str) -> Iterator[tuple[re.Match[str], int]]:
-    """Yield the matches of a pattern in a text, and the line in which the first group of each begins."""
+    """Yield the matches of a pattern in a text, each with the line in which its first group begins."""
     line, before = 1, 0
     for match in re.finditer(pattern, text):
         line += text.count("\n", before, match.start(1))
@@ -96,7 +96,7 @@ def _cache_entries(tree: Frames) -> Iterator[tuple[str, str, float, float, float
 
 
 def write_tree(tree: Frames, style: Style) -> str:
-    """Return a flowchart of mermaid, a digraph of graphviz, or tf2's listing, `{}` for no frames."""
+    """Return a flowchart of mermaid, a digraph of graphviz, or the listing of tf2 (`{}` without frames)."""
     if style.format == "tf2":
         return "".join(
             f"{child}: \n"
@@ -132,7 +132,7 @@ def _escaped(text: str) -> str:
 
 
 def _view_frames(tree: Frames) -> str:
-    """Return the digraph; the legend, which graphviz must attach to something, is above the first root."""
+    """Return the digraph of a moving tree; graphviz must attach the legend to a node, which is the first root."""
     lines, last = ["digraph G {"], 0.0
     for number, (child, parent, rate, newest, oldest, length) in enumerate(_cache_entries(tree)):
         label = (

@@ -41,7 +41,7 @@ _VECTOR = r"[^\n]*\n(?:[^\n]*\n)??[ \t]*{}:\s*\[([^\[\]]*)\]"
 
 
 def read(file: InputFile, options: Options) -> Iterator[Edge]:
-    """Yield one edge per camera and IMU; duplicates are checked."""
+    """Yield one edge per camera and IMU; a second pose between the same frames is checked against the first."""
     reading = Reading(file.source, normalize=options.normalize)
     text, lines, stated, imu = file.text, dict[str, int](), list[Stated](), ""
     for head in _HEAD.finditer(text):
@@ -59,7 +59,7 @@ def read(file: InputFile, options: Options) -> Iterator[Edge]:
             pose = _kalibr_pose(text, head, reading)
         except ValueInvalid as error:
             raise file.error(f"{label}: {error}", lines[label]) from None
-        if target != source:  # as the first IMU relative to itself
+        if target != source:  # not the first IMU relative to itself
             child = max(target, source, key=lambda name: (name[:3] == "cam", name[:3], len(name), name))
             stated.append(Stated(target, source, child, pose, (label,), chained=target[:3] == source[:3] == "cam"))
     if not stated:
@@ -82,7 +82,7 @@ def read(file: InputFile, options: Options) -> Iterator[Edge]:
 
 
 def _kalibr_pose(text: str, head: re.Match[str], reading: Reading) -> Rigid:
-    """Read the q and t below a baseline, or the four rows below the line of a matrix; raises Misfit."""
+    """Read q and t below the line of a baseline, or the four rows below the line of a matrix; raises Misfit."""
     if not head["name"]:
         rows = _ROWS.match(text, head.end())
         words = re.findall(r"[^\s\[\],]+", rows[1]) if rows else []

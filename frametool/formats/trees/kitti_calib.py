@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 CAMERAS = ("cam0", "cam1", "cam2", "cam3")
 RECTIFICATIONS = ("R0_rect", "R_rect")
-# name of a rotation, or of a pose of twelve numbers; that of its translation; parent, child; whether it is the inverse
+# name of a rotation or a pose of twelve numbers, name of its translation, parent, child, True for child<-parent
 OF_KITTI = (
     *((name, "", "cam0", "velo", False) for name in ("Tr", "Tr_velo_to_cam", "Tr_velo_cam")),
     *((name, "", "velo", "imu", False) for name in ("Tr_imu_to_velo", "Tr_imu_velo")),
@@ -47,7 +47,7 @@ _COUNTS = (  # pattern of a name, number of values
 
 
 class KittiLine(NamedTuple):
-    """The numbers of one line."""
+    """The numbers of one line, also as written."""
 
     line: int
     numbers: tuple[float, ...]
@@ -87,14 +87,14 @@ def kitti_lines(file: InputFile, options: Options) -> dict[str, KittiLine]:
 
 
 def kitti_name(frame: str, options: Options) -> str:
-    """Return the name of a frame."""
+    """Return the name of a frame of KITTI, as set by --frames."""
     base, rest = (frame[:-5], "_rect") if frame.endswith("_rect") else (frame, "")
     known = (*CAMERAS, "velo", "imu")
     return (options.answers.names(*known)[known.index(base)] if base in known else base) + rest
 
 
 def read(file: InputFile, options: Options) -> Iterator[Edge]:
-    """Yield the edges of one file of a calibration."""
+    """Yield the edges of one calibration file."""
     lines = kitti_lines(file, options)
     is_raw = "R" in lines or "T" in lines
     found: list[tuple[str, str, Rigid, int]] = []
@@ -115,7 +115,7 @@ def read(file: InputFile, options: Options) -> Iterator[Edge]:
         pose = (x, y, z, *rotation)
         found.append((parent, child, rigid.inverse(*pose) if inverse else pose, line))
     rect = "_rect" if any(name in lines for name in RECTIFICATIONS) else ""
-    # the cameras of projections have the axes of the rectified first one: the centre is -K^-1 p
+    # in a projection, cameras have the axes of the rectified cam0: their centre is -K^-1 p
     for index in () if is_raw else (1, 2, 3):
         if known := lines.get(f"P{index}"):
             fx, _, cx, px, _, fy, cy, py, _, _, _, pz = known.numbers
@@ -134,7 +134,7 @@ def read(file: InputFile, options: Options) -> Iterator[Edge]:
 
 
 def _ends(file: InputFile, lines: dict[str, KittiLine], options: Options) -> tuple[str, str]:
-    """Return parent and child of the pose R: and T: of the raw recordings, by the file's name or contents."""
+    """Return parent and child of R: and T: of the raw recordings, by --frames, or the file's name or contents."""
     for name, other in (("R", "T"), ("T", "R")):
         if name not in lines:
             raise file.error(f"missing {name}: together with {other}:")

@@ -39,7 +39,7 @@ if TYPE_CHECKING:
 _PYTHON = re.compile(r"(?m)^ *(?:def |import |from \w[\w.]* import )")
 _SUBSTITUTION, _ARGUMENT = re.compile(r"\$\([^()]*\)?"), re.compile(r"\$\((?:arg|var)\s+([^\s()]+)\s*\)")
 _NO, _YES = ("0", "false"), ("1", "true")
-# arguments of Python's calls -> the fields of XML; fields -> kinds of actions
+# argument of a call in Python -> field as in XML; field -> kind of action
 FIELDS = {
     "package": "pkg", "executable": "exec", "node_executable": "exec", "arguments": "args", "cmd": "cmd",
     "plugin": "plugin",
@@ -80,12 +80,12 @@ def read(file: InputFile, options: Options) -> Iterator[Edge]:
 
 
 def _key(action: Action) -> str:
-    """Return the field with the arguments of a call."""
+    """Return the name of the field with the arguments of a call."""
     return "cmd" if action.kind == "executable" else "args"
 
 
 def _is_reported(action: Action) -> bool:
-    """Return True for a call of the publisher, which is read or listed, and for an included file."""
+    """Return True for a call of static_transform_publisher, which is read or reported, and for an included file."""
     fields = action.fields
     if action.kind == "executable":
         command = fields.get("cmd")
@@ -188,7 +188,7 @@ def _entries(entries: Any, path: Path, conditions: list[str]) -> Iterator[tuple[
 
 
 def _of_python(source: Source) -> list[Action]:
-    """Return the calls in Python, each with the conditions around it, in the order of the text."""
+    """Return the launch actions in Python code, each with the conditions around it, in the order of the text."""
     found = []
     try:
         with warnings.catch_warnings():
@@ -221,7 +221,7 @@ def _of_python(source: Source) -> list[Action]:
 
 
 def _literal(node: ast.expr) -> Any:
-    """Return the literal value of an argument; else a Misfit that quotes the part that is not literal."""
+    """Return the literal value of an argument; for other expressions a Misfit that quotes them."""
     match node:
         case ast.List(elts=items) | ast.Tuple(elts=items):
             found = [_literal(each) for each in items]
@@ -235,12 +235,12 @@ def _literal(node: ast.expr) -> Any:
 
 
 def _written(node: ast.expr) -> str:
-    """Return an expression as Python writes it, on one line."""
+    """Return an expression as Python code on one line."""
     return " ".join(ast.unparse(node).split())
 
 
 def _conditions(fields: Mapping[str, Any]) -> list[str]:
-    """Return the fields `if` and `unless`."""
+    """Return the fields `if` and `unless` as text, `if="..."`."""
     return [f'{key}="{fields[key]}"' for key in ("if", "unless") if type(fields.get(key)) is str]
 
 

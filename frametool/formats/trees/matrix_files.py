@@ -49,7 +49,10 @@ MATRIX = notation("matrix")
 
 
 class Grid(NamedTuple):
-    """A matrix in text: rows and columns (0 if rows differ in length), one text per number, and the path of each."""
+    """A matrix in a document.
+
+    rows, columns: its size; columns is 0 if rows differ in length; texts: one per number; places: the path of each
+    """
 
     rows: int
     columns: int
@@ -67,7 +70,7 @@ class Grid(NamedTuple):
 
 
 def grid_of(value: Any) -> Grid | None:
-    """Return a value as a matrix; None if it is not one.
+    """Return a value as a matrix; None if it is something else.
 
     Raises Misfit if its data do not have the stated size.
     """
@@ -103,7 +106,7 @@ _TIGHT_KEY = r"(?m)^( *(?:- +)*[\w.-]+):(?=[^\s:/])"
 def made_ordinary(file: InputFile) -> InputFile:
     """Convert a text with OpenCV's header into plain YAML: the header a comment, a blank after each colon.
 
-    Places in the text are preserved, except one to the right after a colon without a blank.
+    Lines are preserved, and columns too, but text after a colon without a blank moves by one.
     """
     if match := re.match(_HEAD, file.text):
         at = match.end() - 1
@@ -115,8 +118,9 @@ TOLERATED = 1e-3  # metres, radians: the largest difference between a pose and i
 
 
 class Stated(NamedTuple):
-    """One stated pose: target_from_source; in a tree `child` is below the other one.
+    """One stated pose: target_from_source.
 
+    child: the frame, of the two, that is the child in the tree
     chained: it relates neighbours in a chain, and is only a check if both are known otherwise
     """
 
@@ -129,7 +133,7 @@ class Stated(NamedTuple):
 
 
 def edges_of(statements: Iterable[Stated], reading: Reading) -> list[Edge]:
-    """Return the edges, and check duplicates against them.
+    """Return the edges of a tree; poses between frames that are already connected are checked against it.
 
     Raises Misfit if a pose and its inverse contradict each other; other contradictions are recorded as warnings.
     """
@@ -177,7 +181,7 @@ _NO_NAMES = dict.fromkeys(("me", "before", "imu", "body", "sensor"), "")
 
 
 def read(file: InputFile, options: Options) -> Iterator[Edge]:
-    """Yield one edge per pose, and check duplicates."""
+    """Yield one edge per pose; duplicates are checked."""
     frames, alone = options.answers.frames, "cam"
     if file.format == "euroc-sensor":  # named after the folder of a sensor.yaml, else after the file
         folder, name = os.path.split("" if file.path == "-" else os.path.abspath(file.path))
@@ -235,7 +239,8 @@ class Matrices:
     ) -> None:
         """Read the whole document; raises Misfit.
 
-        frames: those of `--frames`, the reference frame, then the blocks; alone: the frame of a matrix outside of them.
+        frames: those of `--frames`, the reference frame, then one per block
+        alone: the frame of a matrix that is in no block
         """
         self.frames, self.answers, self.reading = frames, answers, reading
         self.base = frames[0] if frames else ""
@@ -244,7 +249,7 @@ class Matrices:
         blocks = [*_blocks(document, "", ())]
         cameras = [
             block
-            for block in blocks  # the first in a chain has no pose
+            for block in blocks  # the first camera in a chain has no pose
             if block.name[:3] not in ("", "imu")
             and (block.name[:3] == "cam" or any(key.startswith("T_") for key in block.entries))
         ]
@@ -259,7 +264,7 @@ class Matrices:
             if number := re.fullmatch(r"(.*?)([0-9]{1,9})", str(block.path[-1]) if block.path else ""):
                 before = names.get((*block.path[:-1], f"{number[1]}{int(number[2]) - 1}"), "")
             sensor = next((each.name for each in bodies if each is not block), body)
-            # the names for the braces in the table
+            # the names for the braces in matrix_keys.KEYS
             known = {"me": block.name or alone, "before": before, "body": body, "sensor": sensor}
             known["imu"] = self.base or "imu"
             paired: set[str] = set()
@@ -275,7 +280,7 @@ class Matrices:
                     self.poses.append(pose)
 
     def _single(self, block: MatrixBlock, key: str, grid: Grid | None, known: dict[str, str]) -> Stated | None:
-        """Return the pose under one key, if it is one."""
+        """Return the pose under one key; None for other values."""
         value, path = block.entries[key], (*block.path, key)
         meaning = meaning_of(key, known, self.frames)
         is_stated = isinstance(meaning, Meaning) and meaning.is_stated
@@ -311,9 +316,9 @@ class Matrices:
         return Stated(*meaning[:3], (*(position or IDENTITY[:3]), *rotation), path, chained=key == "T_cn_cnm1")
 
     def _named(self, block: MatrixBlock, path: Path) -> Meaning | None:
-        """Return the meaning from the keys next to a matrix that name its two frames; None without such keys.
+        """Return the meaning from keys next to a matrix that name its two frames; None without such keys.
 
-        Raises Misfit if one of the two is missing, and Unclear if nothing states the direction.
+        Raises Misfit if one of the two is missing, and Unclear if neither key nor option states the direction.
         """
         for target, source in FRAME_KEYS:
             if target in block.entries and source in block.entries:
@@ -327,7 +332,10 @@ class Matrices:
         return None
 
     def _pair(self, block: MatrixBlock, key: str, turn: Grid, translation: str, target: str, source: str) -> Stated:
-        """Read a rotation and its translation."""
+        """Read a rotation and its translation, a matrix or rotation vector and three numbers.
+
+        translation: key of the translation; target, source: as in `matrix_keys.PAIRS`
+        """
         path, place = (*block.path, key), (*block.path, translation)
         shift = within(place, grid_of, block.entries[translation])
         if shift is None or not shift.holds(3):
@@ -353,7 +361,7 @@ class Matrices:
 
 
 def _blocks(entries: dict[str, Any], name: str, path: Path) -> Iterator[MatrixBlock]:
-    """Yield a map and its nested maps; those of a list by its name and their number."""
+    """Yield a map and its nested maps; those in a list are named after the list, with their number."""
     yield MatrixBlock(name, entries, path)
     for key, value in entries.items() if len(path) < 8 else ():
         inner = BLOCK_NAMES.get(key, key)
@@ -367,7 +375,7 @@ def _blocks(entries: dict[str, Any], name: str, path: Path) -> Iterator[MatrixBl
 def stored(outer: Element, path: Path, elements: dict[Path, Element]) -> Any:
     """Return the contents of an element of `<opencv_storage>`: a map, a list of `_`, the words of a matrix, or a text.
 
-    elements: receives the element at which each path begins
+    elements: receives path -> element
     """
     if len(path) >= DEEPEST:
         raise outer.error(f"more than {DEEPEST} elements inside one another")
@@ -383,7 +391,7 @@ def stored(outer: Element, path: Path, elements: dict[Path, Element]) -> Any:
 
 
 def write_tree(tree: Frames, style: Style) -> str:
-    """Return a camera chain; or OpenCV's YAML, one matrix per edge, named `parent_T_child`.
+    """Return a camera chain, or OpenCV's YAML with one matrix per edge, named `parent_T_child`.
 
     Raises ValueInvalid for trees that do not fit, e.g. names that OpenCV does not accept.
     """

@@ -60,9 +60,10 @@ NO_POSE = (
 
 
 class Meaning(NamedTuple):
-    """The meaning of a matrix: it maps points of `source` to `target`; in a tree `child` is below the other one.
+    """The meaning of a matrix: it maps points of `source` to `target`.
 
-    is_stated: the key states it; otherwise it is the meaning with `--direction parent-from-child`
+    child: the frame, of the two, that is the child in the tree
+    is_stated: the key states the direction; otherwise this is the meaning with `--direction parent-from-child`
     """
 
     target: str
@@ -72,10 +73,10 @@ class Meaning(NamedTuple):
 
 
 def meaning_of(key: str, known: Mapping[str, str], frames: Sequence[str] = ()) -> Meaning | Unclear | None:
-    """Return the meaning of a key, or the error if it may name two frames in several ways; None if not in the table.
+    """Return the meaning of a key, or an error if it may name two frames in several ways; None for unknown keys.
 
-    key: without the part before its last point (`IMU.T_b_c1`).
-    known: names for the braces; frames: names set by the user, which may be parts of the key.
+    key: a part before its last point (`IMU.T_b_c1`) is ignored
+    known: names for the braces of the table; frames: names set by the user, which may be parts of the key
     """
     last = key.rpartition(".")[2]
     for row in (*AMBIGUOUS, *KEYS):
@@ -111,12 +112,12 @@ def _filled(pattern: str, a: str, b: str) -> str:
 
 
 def partner_of(key: str, others: Collection[str]) -> tuple[str, str, str] | None:
-    """Return the key of the translation that belongs to that of a rotation, and two frames as in `PAIRS`."""
+    """Return the key of the translation for the key of a rotation, target and source as in PAIRS; None without one."""
     for rotation, translation, target, source, needed in PAIRS:
         match = re.fullmatch(rotation, key)
         if match is None or (needed and not any(re.fullmatch(needed, other) for other in others)):
             continue
-        if match.groups():  # a single key belongs to it, which is looked up directly
+        if match.groups():  # a numbered key has exactly one partner, which is looked up directly
             wanted = match.expand(translation)
             found = wanted if wanted in others else None
         else:
@@ -127,7 +128,7 @@ def partner_of(key: str, others: Collection[str]) -> tuple[str, str, str] | None
 
 
 def directed(what: str, path: Path, parent: str, child: str, answers: Answers) -> Meaning:
-    """Return the direction of --direction for two frames; raises Unclear if it is not set."""
+    """Return the meaning for two frames with the direction of --direction; raises Unclear if that is not set."""
     if not answers.direction:
         one, other = DIRECTIONS
         a, b = bare(parent), bare(child)

@@ -39,7 +39,7 @@ def read(file: InputFile, options: Options) -> Iterator[Edge]:
 
 
 def _edges(file: InputFile, options: Options, value: Any, reading: Reading) -> Iterator[Edge]:
-    """Yield one edge per pose of a sensor, one sample per ego pose, or of sensor.json the frame above the sensors."""
+    """Yield one edge per sensor, one sample per ego pose, or for sensor.json the ego frame without a parent."""
     world, ego = options.answers.names("global", "ego")
     records = _records(value)
     if "sensor_token" in records[0]:
@@ -104,7 +104,7 @@ def _text(record: dict[str, Any], key: str) -> str:
 
 
 def channels_of(file: InputFile) -> dict[str, str] | None:
-    """Return the names of sensors, by their tokens; None without the table of them."""
+    """Return the names of sensors by token, from sensor.json; None without this file."""
     table = next((each for each in file.siblings if os.path.basename(each.path) == SENSORS), None)
     if table is None:
         path = os.path.join(os.path.dirname(file.path), SENSORS)

@@ -1,7 +1,7 @@
 """The JSON Schema of frametool's trees in YAML and JSON, for editors: their keys, and the types of values.
 
-A schema accepts more than the reader, and never less: texts such as `90deg` stand for numbers, names may look like
-numbers, and what keys mean together is checked when a file is read.
+The schema accepts more than the reader, never less: texts such as `90deg` are accepted as numbers, names may look like
+numbers, and combinations of keys are checked only when a file is read.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ NUMBER: Schema = {"type": ["number", "string"]}
 NAME: Schema = {"type": ["string", "number", "boolean"], "description": "the name of a frame"}
 UNIT = {True: ", degrees", False: ", radians", None: ", radians unless angles: deg"}
 KEYS = WORDS | EARTH_KEYS | STAMP_KEYS | {"samples", "camera"}
-MODEL: Schema = {"anyOf": [{"enum": [*CAMERA_MODELS]}, {"type": "string"}]}  # of a camera; in any case they are read
+MODEL: Schema = {"anyOf": [{"enum": [*CAMERA_MODELS]}, {"type": "string"}]}  # camera model, in upper or lower case
 MEANINGS: dict[str, Schema] = {
     "inverse": {"enum": [True, False], "description": "true: the numbers are those of the parent in the frame"},
     "angles": {"enum": ["deg", "rad"], "description": "the unit of bare angles"},
@@ -84,7 +84,7 @@ def _ref(name: str) -> Schema:
 
 
 def _entry(also: Collection[str], without: Collection[str] = ()) -> Schema:
-    """Return the schema of an entry: the keys of poses, and those of its place in the tree."""
+    """Return the schema of an entry: the keys of poses, and `also`, without others."""
     keys = (KEYS - NAMES).union(also).difference(without)
     properties = {key: {"$ref": f"#/$defs/keys/properties/{key}"} for key in sorted(keys)}
     return {"type": ["object", "null"], "properties": properties, "additionalProperties": False}
@@ -114,6 +114,6 @@ def _of_key(key: str) -> Schema:
 
 
 def _numbers(names: Collection[str], about: str) -> Schema:
-    """Return a list, or a mapping with these keys, if there are any."""
+    """Return the schema of a list of numbers, or also of a mapping with these names, if there are any."""
     kinds = ["array", "object"] if names else ["array"]
     return {"type": kinds, "properties": dict.fromkeys(names, NUMBER), "description": about}

@@ -8,7 +8,7 @@
     {name: map, at: {lat: 48.1, lon: 11.5, alt: 520}, axes: enu}              a position on the Earth, in `ecef`
 
 Metres, radians unless a key states degrees; every pose is that of the frame in its parent: parent_from_child.
-Functions for documents that other YAML and JSON formats share are below; they know nothing of their keys.
+Other formats in YAML and JSON use `edges_of` and `document_edges`, which do not depend on the keys of a format.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ XYZ = ("x", "y", "z")
 MOST_KEYS, MOST_CHARACTERS = 5, 80  # of a mapping in a message
 NO_NAME = "is in place of a frame's name: a root has no pose, its keys are its children"
 CAMERA_KEYS = ("model", "K", "D", "size", "skew", "xi", "alpha", "beta", "w", "axes", "R", "P")
-LOOSE = frozenset(("x", "roll", "yaw", "theta", "qw", "yaw_deg", "x_mm"))  # single numbers
+LOOSE = frozenset(("x", "roll", "yaw", "theta", "qw", "yaw_deg", "x_mm"))  # keys of poses with one key per number
 
 
 def read(file: InputFile, options: Options) -> Iterator[Edge]:
@@ -57,9 +57,9 @@ def edges_of(
 ) -> Iterator[Edge]:  # fmt: skip
     """Yield the edges that `take` finds in each document, with their paths from the top of the text.
 
-    take: (value, reading) to edges with paths relative to the document; raises Misfit, or collects it with
-    `reading.refuse`.
-    notes, faults: receive warnings and errors, with such paths too.  Raises FormatError if errors are not collected.
+    take: function of a document's value and a Reading that returns edges with paths relative to the document; raises
+        Misfit, or collects it with `reading.refuse`
+    notes, faults: receive warnings and errors, with such paths too; without `faults` errors raise FormatError
     """
     for document in documents:
         reading = Reading(document.source, normalize=normalize)
@@ -67,7 +67,7 @@ def edges_of(
         try:
             for edge in take(document.value, reading):
                 found = edge
-                if edge.child[0] == "/" or (edge.parent or "")[:1] == "/":  # one is left out, as by tf2
+                if edge.child[0] == "/" or (edge.parent or "")[:1] == "/":  # one leading slash is removed, as by tf2
                     reading.here = edge.path
                     child = reading.bare(edge.child)
                     found = edge._replace(child=child, parent=edge.parent and reading.bare(edge.parent))
@@ -120,7 +120,7 @@ def read_edges(value: Any, reading: Reading) -> Iterator[Edge]:
 
 
 def _below(root: str, children: Any, path: Path, reading: Reading) -> Iterator[Edge]:
-    """Iterate over one nested tree, parents before children; with a stack, so that any depth works."""
+    """Yield the edges of one nested tree, parents before children; with a stack, so that any depth works."""
     pending = [(root, children, path)]
     while pending:
         parent, entries, path = pending.pop()
@@ -150,7 +150,7 @@ def _below(root: str, children: Any, path: Path, reading: Reading) -> Iterator[E
 
 
 def _entries(entries: list[Any], path: Path, reading: Reading) -> Iterator[Edge]:
-    """Iterate over a list of entries, frametool's or ROS messages."""
+    """Yield the edges of a list of entries, frametool's or ROS messages."""
     for index, entry in enumerate(entries):
         here = (*path, index)
         reading.here = here
@@ -176,7 +176,7 @@ def _entry(entry: Any, path: Path, reading: Reading) -> list[Edge]:
 
 
 def _pose(entry: dict[str, Any], reading: Reading, also: Collection[str]) -> Pose:
-    """Read the pose of an entry; axes next to samples are those of the samples."""
+    """Read the pose of an entry; `axes` next to `samples` belongs to the samples."""
     if AXES_KEY in entry and "samples" in entry:
         entry = {key: value for key, value in entry.items() if key != AXES_KEY}
     if not (POSE_KEYS.issuperset(entry) or LOOSE.isdisjoint(entry)):
@@ -199,7 +199,7 @@ def camera_fields(value: Any) -> dict[str, Any]:
 
 
 def numbers_of(value: Any) -> Any:
-    """Return the numbers of a text, of lists of such, and of matrices with rows."""
+    """Convert texts to numbers: a single one, nested lists, or the `data` of an OpenCV matrix."""
     if isinstance(value, dict):
         return numbers_of(value.get("data", []))
     if isinstance(value, list):
@@ -208,7 +208,7 @@ def numbers_of(value: Any) -> Any:
 
 
 def _above(pose: Pose, parent: str | None, entry: dict[str, Any]) -> str | None:
-    """Return the reference frame of a pose: the enclosing one, or its own; raises Misfit if they conflict."""
+    """Return the reference frame of a pose: the enclosing frame, or its own; raises Misfit if they conflict."""
     if pose.parent is None or "parent" in entry:
         return pose.parent or parent
     if parent not in (None, *readers.EARTH_FRAMES):  # a position on the Earth implies its frame
@@ -236,7 +236,7 @@ def _edges(
 
 
 def _messages(value: dict[str, Any], path: Path, reading: Reading) -> Iterator[Edge]:
-    """Read every TransformStamped of a ROS message."""
+    """Yield one edge per TransformStamped of a ROS message."""
     for message, here in messages.messages(value, path):
         reading.here = here
         try:
@@ -284,7 +284,7 @@ def _samples(
 
 
 def _sample(sample: Any, reading: Reading, *, uncertain: bool) -> tuple[Pose, int]:
-    """Read one pose with its stamp.  uncertain: there is a covariance for all."""
+    """Read one pose with its stamp; uncertain: the entry has a covariance for all samples."""
     pose = _pose(as_mapping(sample, "a sample {stamp: .., xyz: [..], ..}"), reading, STAMP_KEYS)
     if found := COVARIANCE_KEYS.intersection(sample):
         raise Misfit(f"{min(found)} is common to all samples; write it next to samples", (min(found),), key=True)
@@ -349,7 +349,7 @@ def document_edges(file: InputFile, options: Options, take: Take, tags: Collecti
 
 
 def located(faults: Sequence[Misfit], source: Source) -> Iterator[tuple[Misfit, int, int]]:
-    """Yield errors with paths from the top of a text, each with its line and column."""
+    """Yield errors with their lines and columns; their paths begin at the top of the text."""
     paths = [fault.path for fault in faults]
     values, keys = (locate_many(source.text, paths, key=key) for key in (False, True))
     for fault, *places in zip(faults, values, keys, strict=True):
@@ -357,11 +357,11 @@ def located(faults: Sequence[Misfit], source: Source) -> Iterator[tuple[Misfit, 
 
 
 def remember(notes: Iterable[Finding], lines: Iterable[int], tally: Diagnostics) -> None:
-    """Record warnings, each with its line and after the keys that lead to it."""
+    """Record warnings in `tally`, each with its line, and with its path in front."""
     for note, line in zip(notes, lines, strict=True):
         tally.note_each(f"{bare(dotted(note.path))}: {note.message}" if note.path else note.message, line, note.rule)
 
 
 def dotted(path: Path) -> str:
-    """Return the keys of a place in a document: `cam0.T_cam_imu`."""
+    """Return the keys of a path with dots between them: `cam0.T_cam_imu`."""
     return ".".join(str(step) for step in path)
