@@ -139,7 +139,7 @@ _NO_NAME = r"header|transform|pose|point|vector|twist|wrench|force|linear|angula
 
 def _are_poses(words: str, begin: Beginning) -> bool:
     """Return True for a map of names, or a list, whose entries are poses; the last one may be truncated."""
-    if not (begin.yaml_keys or begin.text.lstrip().startswith("{")) or not isinstance(begin.value, dict):
+    if not re.search(r"(?m)^[^\s#][^\n]*:(?:\s|$)|\A\s*\{", begin.text) or not isinstance(begin.value, dict):
         return False
     top = {key: each.value for key, (_, each) in begin.value.items() if key != "angles"}
     entries = [*top.values()]

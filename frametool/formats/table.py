@@ -147,8 +147,9 @@ _LIKE_KITTI = _UNNAMED % (r"r1[13][ \t]+r21|z[ \t]+r11|r33[ \t]+t?x", r"(?:[ \t]
 
 _KEY = r"""(?:\s|\{|#[^\n]*\n)*+["']?(?:%s)["']?:[ \t]*+"""
 _PARTS = "linear|angular|force|torque|position|translation"  # keys of a message
-_FIRST = r"""(?m)^[ \t{]*+["']?[\w./-]+["']?:[ \t]*+"""  # no lines before it: the search begins at each line
-_TWO_KEYS = _FIRST + _KEY % rf"(?!(?:{_PARTS})['\":])[\w./-]+"
+_NAME = r"""(?:"(?:[^"\\\n]|\\.)++"|'[^'\n]++'|[\w./-]++(?: [\w./-]++)*+)"""  # the key of a frame
+# no lines before the first: the search begins at each line
+_TWO_KEYS = rf"""(?m)^[ \t{{]*+{_NAME}:(?:\s|\{{|#[^\n]*\n)*+(?!["']?(?:{_PARTS})["':]){_NAME}:[ \t]*+"""
 _POSE_IN_TWO = rf"{_TWO_KEYS}(?:{_KEY % 'x|y|z|roll|pitch|yaw'}{NUMBER}[ ,]*){{3,}}+(?!{_KEY % 'q?[wxyz]'}{NUMBER})"
 
 _EUROC = (

@@ -186,6 +186,14 @@ def test_a_tree_is_written_so_and_reads_back_to_the_same_bits(run: Run, tmp_path
     assert (tmp_path / "n.yaml").read_text().startswith("base: {parent: map, xyz: [0.1, 0.2, 0.3], quaternion: {x: ")
 
 
+@pytest.mark.parametrize("fmt", ["named", "autoware"])
+@pytest.mark.parametrize("name", ["arm::tip", "site:tip", "lidar top", "a,b", "#1", "a: b", "007", "it's", '"q"', "<a&b>", "{y}", "~"])
+def test_it_is_recognised_whatever_its_frames_are_called(run: Run, fmt: str, name: str) -> None:
+    source = json.dumps([{"name": name, "parent": f"{name}0", "xyz": [1, 2, 3]}])
+    written = run("tree", "a.json", "-f", fmt, files={"a.json": source}).out
+    assert run("tree", "b.yaml", "-f", "json", files={"b.yaml": written}).out == run("tree", "a.json", "-f", "json").out
+
+
 def test_python_reads_it_with_the_same_answers(tmp_path: Path) -> None:
     (tmp_path / "e.yaml").write_text(f"lidar: {{trans: [0.5, 2, -1], rot: [{HALF}, 0, 0, {HALF}]}}\n")
     with pytest.raises(Unanswered, match="give --from xyzw or --from wxyz"):
