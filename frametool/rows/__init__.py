@@ -1,9 +1,9 @@
-"""Rows of any format through an operation to rows of any format, block by block: knows no command line.
+"""Streams of rows: read any format, apply an operation block by block, write any format.  Independent of the CLI.
 
-sources: what rows come from
-record, holders, columns, columns_earth, columns_uncertain: what their numbers are, by the names of keys and columns
-shapes, request, plan: what they mean, what is done with them, and where the results go
-evaluate, plain: the numbers of one block as arrays, and those of few records without numpy
-sinks: what results are written as
-faults: a run from end to end, with the bad rows
+sources: readers of tables, records and files of columns
+record, holders, columns, columns_earth, columns_uncertain: the meaning of numbers, from the names of keys and columns
+shapes, request, plan: the meaning of a row, the operation on it, and where its result is written
+evaluate, plain: the arithmetic, on arrays for blocks, and without numpy for few records
+sinks: writers
+faults: the run from the first block to the exit status, with reports of bad rows
 """

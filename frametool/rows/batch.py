@@ -1,7 +1,7 @@
-"""A block of rows: what a format found in it, names and stamps read in bulk, and the text of the results around them.
+"""Blocks of rows: numbers and other cells as arrays, names and stamps read in bulk, results as text and as poses.
 
-Knows no syntax: what a format found is spans of text, what it wants written is a list of pieces.  Stamps are decimal
-seconds or nanoseconds, read as integer nanoseconds, never through a float.
+Knows no syntax: a source passes cells as spans of text, and the text of a result as a list of pieces.  Stamps in
+seconds or in nanoseconds are read as integer nanoseconds, never through a float.
 """
 
 from __future__ import annotations
@@ -45,13 +45,13 @@ if TYPE_CHECKING:
 
 
 class Coded(NamedTuple):
-    """A column of texts as the distinct ones and the number of each row's; without numbers one for all rows."""
+    """A column of texts: the distinct ones, and the index of each row's text; codes None: one text for all rows."""
 
     texts: Sequence[Any]
     codes: Ints | None = None
 
     def of_rows(self, size: int) -> Ints:
-        """Return the number of the text of each of so many rows."""
+        """Return the index of the text of each of `size` rows."""
         return np.zeros(size, np.int64) if self.codes is None else self.codes
 
     def each(self) -> list[str]:
@@ -59,23 +59,24 @@ class Coded(NamedTuple):
         return [self.texts[code] for code in self.of_rows(1).tolist()]
 
     def numbers(self, read: Callable[[str], float]) -> tuple[Floats, dict[int, str]]:
-        """Read the number that each encodes, nan if none, and why a row has none."""
+        """Convert each text to a number; return the numbers, nan where `read` raises, and the reasons by row."""
         known = np.full(len(self.texts), np.nan)
         reasons = read_each(known, range(len(known)), lambda at: read(self.texts[at]))
         codes = self.of_rows(1)
         return known[codes], {row: reasons[at] for row, at in enumerate(codes.tolist()) if at in reasons}
 
 
-ALL_ALIKE = Coded((None,))  # rows that name no frame
+ALL_ALIKE = Coded((None,))  # no row names a frame
 
 
 class BlockNames(NamedTuple):
-    """The names of a block's rows.
+    """The names of frames in the rows of a block, and in their results.
 
-    frames: those that the rows are expressed in; for look-ups the two names, parted by NUL
-    pairs, results: the parents and names that there are, and those of their results; of_row: (n,) those of a row
-    lost: the first row whose result cannot name a frame: that frame
-    bad: rows whose names do not fit: column and reason
+    frames: the frame that each row is expressed in; for look-ups by two columns both names, joined by NUL
+    pairs: the distinct (parent, name) of the rows; results: the (parent, name) of their results
+    of_row: (n,) index of each row's pair; None for a single pair
+    lost: the first row that names a frame which its result does not name, with that frame
+    bad: rows with names that the request does not allow, with column and reason
     """
 
     frames: Coded
@@ -86,26 +87,26 @@ class BlockNames(NamedTuple):
     bad: Mapping[int, tuple[str, FrametoolError | str]] = MappingProxyType({})
 
     def texts(self, role: int, rows: Ints) -> list[str | None]:
-        """Return the parents (0) or names (1) of the results of rows, or one for all."""
+        """Return the parents (role 0) or the names (role 1) of the results of some rows, or one for all."""
         texts = [pair[role] or None for pair in self.results]
         return texts if len(texts) == 1 or self.of_row is None else [texts[at] for at in self.of_row[rows].tolist()]
 
 
 class Block(NamedTuple):
-    """What a format found in a block of text.
+    """The content of one block of input.
 
-    numbers: (n, c) the cells with our numbers, or the numbers themselves
-    parts: spans (n,) that pieces refer to by their keys
-    places: (n,) where each row is among all that the block holds
-    line_of: the line of a row, from 0
-    unchanged: place and text of what passes as it is
-    broken: place and fault of rows that no number can be read from
-    names: those of the rows, and of their results
-    stamps: for each shape (or one for all) the nanoseconds, None where it has none
-    bad: rows that are bad by what is no number: column and reason
-    frames: for each shape (or one for all) the name of the frame each row is expressed in
-    place_of: line, from 0, and column, from 1, of one of a row's numbers, where columns have no names
-    gone: rows that have no numbers on purpose, and no result
+    numbers: (n, c) cells of the numbers, or the numbers themselves
+    parts: the spans (n,) that pieces refer to, by key
+    places: (n,) the position of each row in the block, in lines, bytes or rows; the output has this order
+    line_of: returns the line of a row, from 0
+    unchanged: position and text of all that is copied to the output
+    broken: position and fault of rows from which no numbers can be read
+    names: the names of the rows and of their results
+    stamps: for each shape, or one for all, (n,) nanoseconds; None without stamps
+    bad: rows that the source finds bad, with column and reason
+    place_of: returns line (from 0) and column (from 1) of a number of a row; None if columns have names
+    frames: for each shape, or one for all, the frame that each row is expressed in
+    gone: rows whose numbers are absent, not invalid: they have no result and are not reported
     """
 
     numbers: Spans | Floats
@@ -123,7 +124,7 @@ class Block(NamedTuple):
 
 
 def read_each(values: NDArray[Any], places: Iterable[int], read: Callable[[int], float]) -> dict[int, str]:
-    """Set the values at some places to what is read there, one by one; return why some have none."""
+    """Set `values[place]` to `read(place)` for each place; return the reason for each place that cannot be read."""
     reasons = {}
     for place in places:
         try:
@@ -134,7 +135,7 @@ def read_each(values: NDArray[Any], places: Iterable[int], read: Callable[[int],
 
 
 def coded(cells: Spans) -> Coded:
-    """Read cells (n,), not none, as texts; where all are the same, as frames often are, that is one text."""
+    """Read cells (n,), n > 0, as a column of texts; if all are equal, as frames often are, only one is decoded."""
     column = without_quotes(cells)
     if (only := one_text(column)) is not None:
         return Coded([_text(only)], np.zeros(len(cells.starts), np.int64))
@@ -144,12 +145,12 @@ def coded(cells: Spans) -> Coded:
 
 
 def codes_of(cells: Cells) -> Coded:
-    """Return cells (n,), not none, as the distinct texts of `texts_of` and the number of each row's."""
+    """Return cells (n,), n > 0, of any type as a column of the texts that `texts_of` returns."""
     return coded(cells) if isinstance(cells, Spans) else coded_texts(texts_of(cells))
 
 
 def one_text(column: Spans) -> bytes | None:
-    """Return the text that all cells (n,), not none, have; None where they differ, or are long."""
+    """Return the text that all cells (n,), n > 0, have in common; None if they differ or are longer than MARGIN."""
     first = column.text(0)
     if len(first) > MARGIN or (column.ends - column.starts != len(first)).any():
         return None
@@ -157,13 +158,13 @@ def one_text(column: Spans) -> bytes | None:
 
 
 def coded_texts(cells: Sequence[Any], text: Callable[[Any], str] = str) -> Coded:
-    """Return cells as the distinct texts and the number of each."""
+    """Return cells as a column of texts; text: converts each distinct value."""
     known, codes = numbered(cells)
     return Coded([*map(text, known)], codes)
 
 
 def numbered(values: Sequence[Any]) -> tuple[dict[Any, int], Ints]:
-    """Return the distinct ones of some values, numbered, and the number of each."""
+    """Return the distinct values, each with its index, and the index of each value."""
     known: dict[Any, int] = {}
     return known, np.fromiter((known.setdefault(each, len(known)) for each in values), np.int64, len(values))
 
@@ -175,9 +176,11 @@ def _text(cell: bytes) -> str:
 def number_spans(
     values: Floats, precision: int | None, separators: bytes, *, yaml: bool = False, null: bytes = b"nan"
 ) -> Spans:
-    """Write floats as fixed decimals or as the shortest text that reads back; YAML wants a point before an exponent.
+    """Write floats (n, k) as fixed decimals, or as the shortest text that reads back to the same bits.
 
-    nan is an empty cell, where `null` is that.
+    separators: the character after each of the k numbers
+    yaml: an exponent has a point before it, as YAML requires
+    null: if b"", nan is an empty cell
     """
     if not null and (gaps := np.isnan(values)).any():
         spans = number_spans(np.where(gaps, 0.0, values), precision, separators)
@@ -194,7 +197,7 @@ def number_spans(
 
 
 def separators(pieces: Iterable[Piece]) -> bytes:
-    """Return the character that follows each number of the result that pieces show."""
+    """Return the character that follows each number of the result in these pieces."""
     after = bytearray()
     for piece in pieces:
         if isinstance(piece, Out):
@@ -207,10 +210,11 @@ def assemble(
     pieces: Sequence[Piece], parts: Mapping[Any, Spans] | Sequence[Spans], results: Floats, locked: Ints,
     precision: int | None = None, *, yaml: bool = False, null: bytes = b"nan",
 ) -> list[Spans]:  # fmt: skip
-    """Return the spans, in order, that make up the rows.
+    """Return the spans that make up the rows, in order.
 
-    results: (n, k) the numbers, as `number_spans` writes them
-    locked: (n,) 1 where angles are not unique
+    parts: the spans (n,) that `In` pieces refer to
+    results: (n, k) the numbers of the result; precision, yaml, null: as for `number_spans`
+    locked: (n,) 1 in rows whose Euler angles are not unique
     """
     found, size, after = list[Spans](), len(locked), separators(pieces)
     if after:
@@ -240,38 +244,38 @@ def assemble(
 
 
 def constant(text: bytes, size: int) -> Spans:
-    """Return one text for so many rows."""
+    """Return one text repeated for `size` rows."""
     starts = np.full(size, MARGIN, np.int64)
     return Spans(framed(text), starts, starts + len(text))
 
 
 def chosen(spans: Spans, rows: Ints) -> Spans:
-    """Keep some rows."""
+    """Return the spans of some rows."""
     return Spans(spans.data, spans.starts[rows], spans.ends[rows])
 
 
 def texts_as_rows(unchanged: Sequence[tuple[int, bytes]]) -> tuple[Ints, list[Spans]]:
-    """Return texts as rows in the order of their places."""
+    """Return pairs of position and text as a group of rows, in the order of their positions."""
     unchanged = sorted(unchanged, key=itemgetter(0))
     return np.array([place for place, _ in unchanged], np.int64), [spans_of([text for _, text in unchanged])]
 
 
 def spans_of(texts: list[bytes]) -> Spans:
-    """Return texts, one a row, as spans."""
+    """Return a list of texts, one per row, as spans."""
     lengths = np.fromiter(map(len, texts), np.int64, len(texts))
     ends = np.cumsum(lengths) + MARGIN
     return Spans(framed(b"".join(texts)), ends - lengths, ends)
 
 
 def written(groups: Sequence[tuple[Ints, list[Spans]]]) -> bytes:
-    """Put the rows of all groups in the order of their places."""
+    """Return the text of all groups of rows, in the order of their positions."""
     if len(groups) < 2:
         return join(groups[0][1]) if groups else b""
     return _in_order(groups)
 
 
 def _in_order(groups: Sequence[tuple[Ints, list[Spans]]]) -> bytes:
-    """Join the spans of each row, and then the rows in the order of their places."""
+    """Join the spans of each row, then the rows in the order of their positions."""
     rows = []
     for _, spans in groups:
         if len(spans) == 1 and spans[0].starts.ndim == 1:
@@ -293,9 +297,11 @@ def _in_order(groups: Sequence[tuple[Ints, list[Spans]]]) -> bytes:
 def stamps_in(
     cells: Sequence[Spans], name: str, *, some_static: bool = False
 ) -> tuple[Ints | None, dict[int, tuple[str, str]]]:
-    """Read the stamps of rows, and which rows have none.
+    """Read the stamps of rows; also return the column and the reason for each row without a valid stamp.
 
-    cells: as for `read_stamps`, or () for none; name: that of their column or key; some_static: they may be empty
+    cells: as for `read_stamps`, or () for rows without stamps, whose stamps are None
+    name: the name of the column or key, which may state the unit
+    some_static: a stamp may be empty
     """
     if not cells:
         return None, {}
@@ -307,10 +313,10 @@ def stamps_in(
 
 
 def read_stamps(cells: Sequence[Spans], *, in_ns: int) -> tuple[Ints, dict[int, str]]:
-    """Read one column (n,) as nanoseconds, or two of whole seconds and nanoseconds.
+    """Read stamps as nanoseconds: one column (n,), or two with whole seconds and nanoseconds.
 
-    in_ns: how many nanoseconds a whole number of one column is; 0 are decimal seconds, and what ends in `ns` is some
-    Gives the stamps, and why a row has none; what is not plainly written is read one by one.
+    in_ns: nanoseconds per unit of an integer in a single column; 0 for decimal seconds, or nanoseconds if `ns` follows
+    Returns the stamps, and the reason for each row without one.  Cells with unusual syntax are read one by one.
     """
     parsed = [parse_stamps(each, in_ns=in_ns if len(cells) == 1 else 1) for each in cells]
     stamps, sure = parsed[0]
@@ -324,22 +330,22 @@ def read_stamps(cells: Sequence[Spans], *, in_ns: int) -> tuple[Ints, dict[int, 
     return stamps, read_each(stamps, np.flatnonzero(~sure).tolist(), read)
 
 
-# --- what became of rows: poses for trees and for other formats; single results as such blocks and back ---
+# --- results as blocks of poses, for trees and other formats; conversion from and to single results ---
 
-NO_STAMP = np.iinfo(np.int64).min  # of a bad row that is kept, of a static one
+NO_STAMP = np.iinfo(np.int64).min  # of a bad row that is kept, and of a static one
 
 
 class RowPoses(NamedTuple):
-    """What became of the rows of a block: the good ones, in their order.
+    """The results of the rows of a block, in their order, without those of skipped rows.
 
-    numbers: (n, k) the results, position first; nan in a row without one that is kept
-    stamps_ns: (n,) or None where rows have none; NO_STAMP in a row without a stamp
-    lines: (n,) from 0
-    parents, names: one a row, one for all, or none
-    extras: columns that are not ours, by name: cells of text, numbers as they are, or objects (see `objects`)
-    read: (n, 3) lat lon alt of positions on the Earth that nothing has moved, as they were read
-    kind: what a row is: a pose, a point, ..; placed: poses have positions, which else are 0
-    more: the names of the numbers that come behind those of the thing itself
+    numbers: (n, k) the results, position first; nan in a row that is kept without a result
+    stamps_ns: (n,), NO_STAMP in a row without a stamp; None if no row has one
+    lines: (n,) lines of the input, from 0
+    parents, names: one per row, or one for all; None or "" where a frame has no name
+    extras: the other columns of the input by name: cells of text, typed arrays, or objects (see `objects`)
+    read: (n, 3) lat, lon, alt as they were read, for positions on the Earth that the operation does not move
+    kind: of each row: a pose, a point, ..; placed: False for poses without a position, which is then 0
+    more: names of the numbers that follow those of the pose or point
     """
 
     numbers: Floats
@@ -354,15 +360,15 @@ class RowPoses(NamedTuple):
     more: tuple[str, ...] = ()
 
     def for_each(self, names: Sequence[str | None]) -> Sequence[str | None]:
-        """Return parents or names, one a row."""
+        """Return parents or names with one entry per row."""
         return names if len(names) == len(self.numbers) else [*names] * len(self.numbers)
 
     def spot(self, row: int) -> Spot | None:
-        """Return the place that a row was read as."""
+        """Return the geodetic position that a row was read from; None if unknown."""
         return None if self.read is None else _place().spot_of(self.read[row].tolist())
 
     def unmoved(self, parts: Components) -> Components:
-        """Return the components of the rows with what they were read as, if it is known."""
+        """Return the components of all rows together with the geodetic positions they were read from, if known."""
         if self.read is None:
             return parts
         return _place().Unmoved(parts, _place().spot_of(np.ascontiguousarray(self.read.T)))  # type: ignore[no-any-return]
@@ -373,11 +379,11 @@ NO_ROWS = RowPoses(np.empty((0, 7)), None, np.empty(0, np.int64), (None,), (None
 
 
 def _place() -> Any:
-    return import_module("frametool.geometry.place")  # few rows are on the Earth
+    return import_module("frametool.geometry.place")  # imported late: few rows are on the Earth
 
 
 def kept(block: RowPoses, rows: slice | Ints) -> RowPoses:
-    """Return some poses of a block."""
+    """Return some rows of a block."""
     at = np.arange(len(block.numbers))[rows]
     parents, names = (
         [each[row] for row in at.tolist()] if len(each) == len(block.numbers) else each
@@ -395,7 +401,7 @@ def kept(block: RowPoses, rows: slice | Ints) -> RowPoses:
 
 
 def taken(cells: Any, rows: Ints) -> Cells:
-    """Return some cells of a column; what is no number, truth value or time of numpy as plain values."""
+    """Return some cells of a column; cells that are neither text nor a typed array are converted to plain values."""
     if isinstance(cells, Spans):
         return Spans(cells.data, cells.starts[rows], cells.ends[rows])
     if is_typed(cells):
@@ -407,17 +413,17 @@ def taken(cells: Any, rows: Ints) -> Cells:
 
 
 def is_typed(cells: Any) -> bool:
-    """Return True if cells are numbers, truth values or times of numpy, one a row."""
+    """Return True if cells are a numpy array (n,) of numbers, booleans or times."""
     return isinstance(cells, np.ndarray) and cells.ndim == 1 and cells.dtype.kind in "fiubM"
 
 
 def block_of(results: BlockResults, *, timed: bool = True, as_poses: bool = False) -> RowPoses:
-    """Return results as one block of poses, points, vectors, twists or wrenches, with their places as lines.
+    """Return results as one block of poses, points, vectors, twists or wrenches; their positions are its lines.
 
-    What a pose lacks is 0 or the identity; stamps that only some have are another column.
-    timed: either all have a stamp, or none
-    as_poses: a position without a rotation is a pose too, not a point; what a pose lacks is nan
-    Raises ValueInvalid for things of several kinds, for other mappings, and for stamps that are missing.
+    A missing position is 0, a missing rotation the identity.  Stamps that only some results have are in `extras`.
+    timed: either all results need a stamp, or none
+    as_poses: a position without a rotation is a pose, not a point, and missing parts are nan
+    Raises ValueInvalid for results of several kinds, for other mappings, and for missing stamps.
     """
     if (alike := results.posed()) is not None:
         return alike
@@ -436,7 +442,7 @@ def block_of(results: BlockResults, *, timed: bool = True, as_poses: bool = Fals
         raise ValueInvalid(SOME_STAMPS)
     stamps_ns = np.array(columns.pop("stamp_ns"), np.int64) if all(type(stamp) is int for stamp in stamps) else None
     return RowPoses(
-        np.array(numbers, np.float64) + 0.0, stamps_ns, np.array(places, np.int64), parents, names,  # none is -0.0
+        np.array(numbers, np.float64) + 0.0, stamps_ns, np.array(places, np.int64), parents, names,  # no -0.0
         {key: objects(column) for key, column in columns.items()},
         None if None in read else np.array(read, np.float64), kinds[0],
         placed=not all(isinstance(value, Result) and value.pose.position is None for value in values),
@@ -444,7 +450,7 @@ def block_of(results: BlockResults, *, timed: bool = True, as_poses: bool = Fals
 
 
 def _row_of(value: Value, *, as_poses: bool) -> tuple[str, Sequence[Any], Frames, Mapping[str, Any]]:
-    """Return what a result is, its numbers, the names of its frames, and its other fields."""
+    """Return the kind of a result, its numbers, its parent and name, and its other fields."""
     if isinstance(value, Result):
         pose, extras = value.pose, value.extras
         if pose.rotation is None and pose.position is not None and not as_poses:
@@ -464,7 +470,7 @@ def _row_of(value: Value, *, as_poses: bool) -> tuple[str, Sequence[Any], Frames
 
 
 def objects(values: Iterable[Any]) -> NDArray[Any]:
-    """Return plain values as a column (n,): texts, None, mappings and lists; numbers and truth values as written."""
+    """Return plain values as an array (n,) of texts, None, mappings, lists; numbers and booleans become `Verbatim`."""
     found = list(values)
     if not {*map(type, found)} <= {str, Verbatim, NoneType}:
         found = [Verbatim(repr(each).lower()) if isinstance(each, (int, float)) else each for each in found]
@@ -472,9 +478,9 @@ def objects(values: Iterable[Any]) -> NDArray[Any]:
 
 
 def values_of(block: RowPoses, place: Place | None = None) -> list[Any]:
-    """Return a block as single results: poses, placed or not, or points, vectors, .. as mappings.
+    """Return the rows of a block as single results: `Result` for a pose, else a mapping.
 
-    place: how positions on the Earth are written
+    place: the notation of positions on the Earth; None for x, y, z
     """
     kind, extras = block.kind, block.more
     names, parents = map(block.for_each, (block.names, block.parents))
@@ -505,7 +511,7 @@ def values_of(block: RowPoses, place: Place | None = None) -> list[Any]:
 
 
 def texts_of(cells: Cells) -> list[str]:
-    """Return the text of each cell, without its quotes; of numbers the shortest that reads back, of lists JSON."""
+    """Return the text of each cell: without quotes, a number as the shortest text that reads back, a list as JSON."""
     if not isinstance(cells, Spans) and cells.dtype == object:
         return [text_of(value) for value in cells.tolist()]
     if not isinstance(cells, Spans) and cells.dtype.kind != "f":
@@ -523,12 +529,12 @@ def texts_of(cells: Cells) -> list[str]:
 
 
 def text_of(value: Any) -> str:
-    """Return a plain value as a text, "" for none."""
+    """Return a plain value as a text, "" for None."""
     return "" if value is None else dump_json(value) if isinstance(value, (dict, list)) else str(value)
 
 
 def plain_cells(cells: Cells) -> list[Any]:
-    """Return cells as plain values."""
+    """Return cells as plain values: None if empty, and numbers and booleans as `Verbatim`."""
     if not isinstance(cells, Spans) and cells.dtype == object:
         return list(cells)
     texts = texts_of(cells)

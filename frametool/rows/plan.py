@@ -1,4 +1,4 @@
-"""Plan the rows of a table from its columns and the request: which columns are read, and where results are written."""
+"""Plan the rows of a table from its columns and the request: the columns to read, and the columns to write."""
 
 from __future__ import annotations
 
@@ -25,20 +25,20 @@ if TYPE_CHECKING:
     from frametool.rows.sources.tables import Table
 
 class Kept(NamedTuple):
-    """A column of the input."""
+    """A column of the input that is unchanged."""
 
     place: int
 
 
 class New(NamedTuple):
-    """A column of the result: its name, and a number, the word that it encodes, or the same text in every row."""
+    """A column of the result: its name, and a number, a word for a number, or a constant text."""
 
     name: str
     piece: Out | Word | Const
 
 
 class Named(NamedTuple):
-    """A frame's name in place of a column: the result's parent (role 0) or what it is the pose of (1)."""
+    """A column of the input in which the result writes a frame: its parent (role 0) or its name (role 1)."""
 
     place: int
     role: int
@@ -48,12 +48,12 @@ Column: TypeAlias = Kept | New | Named
 
 
 class Layout(NamedTuple):
-    """The columns of the output, and of the input what is read.
+    """The columns of the output, and the columns of the input to read.
 
-    places: the columns our numbers are read from
-    times: that of the stamps, and of the nanoseconds of stamps whose seconds are whole
-    frames: those that name the frame a row is expressed in, for look-ups the two frames
-    named: those of the parent and of the name of a row's pose
+    places: the columns of the numbers, in the order of the shapes
+    times: the column of stamps; of whole seconds also that of the nanoseconds
+    frames: the columns that name the frame a row is expressed in; for look-ups both frames
+    named: the columns of the parent and of the name of a row's pose
     """
 
     columns: tuple[Column, ...]
@@ -64,9 +64,9 @@ class Layout(NamedTuple):
 
 
 def plan_table(table: Table, request: Request) -> tuple[Plan, Layout]:
-    """Choose the columns that are read and written; raises ValueInvalid that names the columns there are.
+    """Choose the columns to read and to write; raises ValueInvalid with the known columns.
 
-    Where all numbers are wanted no text is put together.
+    With `all_numbers` in the request the plan has no pieces of text.
     """
     formula, poses, names = request.operation.formula, list[PoseColumns](), table.names or ()
     is_needed = formula is None or formula.reads_row or bool(request.rows.columns)
@@ -83,7 +83,7 @@ def plan_table(table: Table, request: Request) -> tuple[Plan, Layout]:
             if columns.wrong:
                 raise ValueInvalid(columns.wrong)
         shapes, places = (*shapes, row_shape(pose, request, kind)), places + pose.places
-    if formula is not None:  # the numbers that it asks for come last
+    if formula is not None:  # the columns that it reads come last
         shapes = ((shapes[0] if shapes else Shape("", None))._replace(extras=formula.columns),)
     if on_earth or request.results.place is not None:
         from frametool.rows.columns_earth import readers_of, settle
@@ -95,23 +95,23 @@ def plan_table(table: Table, request: Request) -> tuple[Plan, Layout]:
 
         extra, shapes = covariance_columns(table, request, shapes)
     request = request.for_kind(shapes[0].kind) if shapes else request
-    places += extra * bool(shapes and shapes[0].covariance)  # an expression has none
+    places += extra * bool(shapes and shapes[0].covariance)  # a formula uses none
     if len({*places}) < len(places):
         twice = sorted({table.name(place) for place in places if places.count(place) > 1})
         raise Misused(f"--columns: {', '.join(twice)} appears twice")
     places += tuple(_place(name, table) for name in request.operation.columns)
     for pose, kind in _turning_along(table, poses, request):
         poses, shapes, places = [*poses, pose], (*shapes, Shape(kind)), places + pose.places
-    has_one = not shapes or request.operation.of == PAIR  # what becomes of a row is one thing
+    has_one = not shapes or request.operation.of == PAIR  # a pair has one result
     targets = tuple(map(request.target, shapes[:1] or (Shape(POSE),) if has_one else shapes))
     frames = _frame_columns(table, request, on_earth=on_earth)
     parent, name = frames[0] if frames and request.rows.poses else None, None
     if request.rows.poses and not (request.operation.moves and request.rename is None):
         name = _first_called(readers.NAME_KEYS, table)
     moves_each = on_earth or request.rows.frames or (frames and request.operation.moves)
-    asked_at = range(shapes[0].own_size, shapes[0].size) if request.operation.shown else ()  # empty cells are not
+    asked_at = range(shapes[0].own_size, shapes[0].size) if request.operation.shown else ()  # read empty as nan
     words, marked, staying = readers_of(shapes[0]) if on_earth else ({}, dict.fromkeys(asked_at, number_or_none), 0)
-    if on_earth and (position := poses[0].position):  # the status of a fix is read and stays as it is
+    if on_earth and (position := poses[0].position):  # the status of a fix is read and unchanged
         position = position._replace(places=position.places[: len(position.places) - staying])
         poses = [poses[0]._replace(position=position)]
     written = _columns(table, poses, shapes, targets, request, (parent, name), extra)
@@ -128,9 +128,9 @@ def plan_table(table: Table, request: Request) -> tuple[Plan, Layout]:
 
 
 def _find(table: Table, request: Request) -> list[PoseColumns]:
-    """Find the columns of the poses, by --columns, by name, or by their number where there are no names.
+    """Find the columns of the poses: those of --columns, else by name, else by their number if they have no names.
 
-    With a pose a twist is another column.
+    A twist next to a pose remains as other columns.
     """
     asked, specs, width = request.rows, request.rows.columns, table.width
     if not asked.poses:
@@ -158,7 +158,7 @@ def _find(table: Table, request: Request) -> list[PoseColumns]:
     if six is not None and (asked.kind in SIX or not others.has_pose):
         return [PoseColumns(six, None)]
     if not (request.operation.moves or request.operation.changes_nothing):
-        others = every  # what a pose has with it would no longer be true
+        others = every  # a twist would no longer be that of the pose
     if asked.poses == 1 and (asked.given_place or any(map(readers.may_be_on_earth, every.names))):
         from frametool.rows.columns_earth import find_pose
 
@@ -168,7 +168,7 @@ def _find(table: Table, request: Request) -> list[PoseColumns]:
 
 
 def _by_width(width: int, request: Request) -> str:
-    """Choose all columns of a table without names: a point, a pose, or what --from says, behind a stamp or not."""
+    """Return all columns of a table without names, if their number decides what they are, perhaps after a stamp."""
     asked, said = request.rows, request.rows.given
     begin = 1 if asked.kind in SIX or width in header.by_count(said) else 2
     if asked.poses == 1 and (begin == 1 or (said is not None and width - 1 in {*said.counts[1:]})):
@@ -180,7 +180,7 @@ def _by_width(width: int, request: Request) -> str:
 
 
 def _turning_along(table: Table, poses: Sequence[PoseColumns], request: Request) -> list[tuple[PoseColumns, str]]:
-    """Find the vectors that turn along with the point or pose of a row, each with its kind."""
+    """Find the columns of vectors that rotate with the point or pose of a row, each with its kind."""
     operation, names, kind = request.operation, table.names or (), request.rows.kind
     if not poses or request.rows.columns or operation.formula is not None:
         return []
@@ -201,7 +201,7 @@ def _turning_along(table: Table, poses: Sequence[PoseColumns], request: Request)
 
 
 def _without_position(pose: PoseColumns, request: Request, table: Table) -> PoseColumns:
-    """Leave the position to pass as it is where only the rotation is rewritten."""
+    """Drop the position of a pose if only its rotation is rewritten; the columns of the position are then unchanged."""
     if pose.rotation is None and request.results.default_notation:
         return pose
     if pose.rotation is None:
@@ -215,7 +215,7 @@ def _without_position(pose: PoseColumns, request: Request, table: Table) -> Pose
 
 
 def _frame_columns(table: Table, request: Request, *, on_earth: bool) -> tuple[int, ...]:
-    """Find the columns that name frames: for look-ups those named, else the one a row is expressed in."""
+    """Find the columns that name frames: those in options, else the one of the frame that rows are expressed in."""
     asked = request.rows
     names = table.names or ()
     if on_earth:
@@ -232,7 +232,7 @@ def _frame_columns(table: Table, request: Request, *, on_earth: bool) -> tuple[i
 
 
 def _first_called(names: Sequence[str], table: Table) -> int | None:
-    """Find the column of one of some names, the first of them that is there; a message's path may be before it."""
+    """Return the place of the column with the first name that exists, also after a message's path; None without one."""
     for name in names:
         for place, column in enumerate(table.names or ()):
             if column == name or ("_id" in name and column.endswith(f".{name}")):
@@ -241,7 +241,7 @@ def _first_called(names: Sequence[str], table: Table) -> int | None:
 
 
 def _place(name: str, table: Table) -> int:
-    """Return the place of a column; raises Misused for one that is not there, or twice."""
+    """Return the place of a column; raises Misused if it is missing or appears twice."""
     names, source = table.called, table.source
     if name not in names and names.count(bare := without_mark(name)) == 1:
         name = bare
@@ -253,9 +253,9 @@ def _place(name: str, table: Table) -> int:
 
 
 def _stamp_columns(table: Table, request: Request, places: Sequence[int], frames: Sequence[int]) -> list[int]:
-    """Find the column of stamps by its name or number, and that of the nanoseconds of such stamps.
+    """Find the column of stamps, by its name or number, and the column of nanoseconds of stamps in whole seconds.
 
-    Where all numbers are wanted it may be one that no option names.
+    With `all_numbers` in the request also a usual column that no option names.
     """
     if request.rows.stamps == NO_STAMPS:
         return []
@@ -272,7 +272,7 @@ def _stamp_columns(table: Table, request: Request, places: Sequence[int], frames
         return []
     usual, below = stamp_places(table.names)
     if not (table.names or request.rows.columns) and min(places, default=1) == 1 and not frames:
-        usual = 0  # what is before the numbers that --from speaks of, or all there is
+        usual = 0  # the column before the numbers, or the only one
     return [] if usual in frames else [place for place in (usual, below) if place is not None]
 
 
@@ -280,9 +280,11 @@ def _columns(
     table: Table, poses: Sequence[PoseColumns], shapes: Sequence[Shape], targets: Sequence[Shape], request: Request,
     named: Sequence[int | None], covariance: Sequence[int],
 ) -> list[Column]:  # fmt: skip
-    """Put results where they come from, number for number where these are the same; else to the first of their columns.
+    """Return the columns of the output; results replace the columns they come from if they match number by number.
 
-    named: the columns of the parent and the name.  Raises Misused for several that have other numbers.
+    Else they replace the first of these columns.  With --keep or a formula they are added.
+    named: the columns of the parent and the name; covariance: the columns of a covariance
+    Raises Misused for several poses whose results have other numbers.
     """
     columns: list[Column] = [Kept(place) for place in range(table.width)]
     operation, asked = request.operation, request.results
@@ -304,7 +306,7 @@ def _columns(
             pose, target, request, shape, first, table.delimiter, several=several, same=is_same
         )
         first += target.size
-        # whether each number of the result replaces one of the input
+        # True if each number of the result replaces one of the input
         read, written = ((each.unit is None, each.whole, len(each.absent)) for each in (shape, target))
         in_place = bool(pose.places) and read == written and shape.place is target.place is None
         in_place = in_place and (is_same or not target.notations or shape.notation is None)
@@ -324,11 +326,11 @@ def _columns(
             parts = [(places, position), ((min(pose.rotation.places),), [*rotation, *extras])]
         else:
             parts = [(places if in_place else (min(places),), [*position, *rotation, *extras])]
-        for own, new in parts:  # what is behind the last one comes after it
+        for own, new in parts:  # further new columns come after the last of these
             for place, column in zip(own, new, strict=False):
                 at[place].append(column)
             at[max(own)] += new[len(own) :]
-    if adds:  # behind those that stay, or in the place of those of their names
+    if adds:  # after the others, or replacing columns of the same name
         gives_way = (operation.shown or PLAIN).replaces
         more = {getattr(each, "name", at) if gives_way else at: each for at, each in enumerate(added)}
         mixed = [more.pop(name, kept) for name, kept in zip(table.called, columns, strict=True)]
@@ -340,10 +342,10 @@ def _new_columns(
     pose: PoseColumns, target: Shape, request: Request, shape: Shape, first: int, delimiter: bytes,
     *, several: bool, same: bool,
 ) -> list[list[Column]]:  # fmt: skip
-    """Name the numbers of a result, from the one at `first`: position, rotation, what else there is.
+    """Return the new columns of a result, numbered from `first`: position, rotation, extras.
 
-    several: it is one of several, so that its names are those of its columns
-    same: its rotation is written in the notation it was read in
+    several: the request has several results, so that the names are those of the input columns
+    same: the rotation is written in the notation in which it was read
     """
     rotation, alone, prefix = pose.rotation, not request.results.prefix or several, request.results.prefix
     affixes = rotation.affixes if rotation and alone else (prefix, "")
@@ -374,10 +376,10 @@ def _new_columns(
 
 
 def pieces_of(columns: Sequence[Column], width: int, delimiter: bytes) -> tuple[Piece, ...]:
-    """Make the pieces of a row out of its columns, as few as can be: neighbours that pass are one stretch.
+    """Return the pieces of a row's text for its columns; neighbouring unchanged columns form one stretch.
 
-    A stretch is what is between two bounds of a row: 0 is the start of the line, cells begin at 1, 3, .. and end at
-    2, 4, .., and the last is the end of the line; or it is a name that is written.
+    The key of a stretch is its two bounds in a row: 0 is the start of the line, cell i begins at 2 i + 1 and ends at
+    2 i + 2, and the last bound is the end of the line.  The key of a written name is its `Named`.
     """
     pieces: list[Piece] = []
 
@@ -389,12 +391,12 @@ def pieces_of(columns: Sequence[Column], width: int, delimiter: bytes) -> tuple[
 
     for before, column in pairwise((None, *columns)):
         last, new = pieces[-1] if pieces else None, column.piece if isinstance(column, New) else None
-        if isinstance(column, Kept):  # with what parts it from the column before, if there is one
+        if isinstance(column, Kept):  # with the delimiter before it, except for the first
             keep(2 * column.place + (before is None and column.place > 0), 2 * column.place + 2)
         elif isinstance(last, Out) and isinstance(new, Out) and last.last == new.first:
             pieces[-1] = last._replace(last=new.last)
         else:
-            if isinstance(before, Kept) and before.place < width - 1:  # with what is behind it
+            if isinstance(before, Kept) and before.place < width - 1:  # with the delimiter after it
                 keep(2 * before.place + 2, 2 * before.place + 3)
             elif before:
                 pieces.append(Const(delimiter or b" "))
@@ -404,7 +406,7 @@ def pieces_of(columns: Sequence[Column], width: int, delimiter: bytes) -> tuple[
 
 
 def refuse_repeated(columns: Sequence[Column], names: Sequence[str]) -> None:
-    """Raise Misused if a new column would be called as one that stays, or as another new one."""
+    """Raise Misused if a new column has the name of an unchanged column, or of another new one."""
     new = [column.name for column in columns if isinstance(column, New)]
     kept = [names[column.place] for column in columns if not isinstance(column, New)]
     if len({*new}) < len(new):

@@ -1,4 +1,4 @@
-"""The request of a stream in any format: the operation, how rows are read, how results are written.
+"""The request of a stream in any format: the operation, how rows are read, and how results are written.
 
 One `Operation` serves floats and arrays alike.
 """
@@ -26,18 +26,18 @@ if TYPE_CHECKING:
 
     Rename: TypeAlias = Callable[[str | None, str | None], tuple[str | None, str | None]]
 
-START, PREVIOUS, VELOCITIES = "start", "previous", "velocities"  # what a row is compared with that comes before it
+START, PREVIOUS, VELOCITIES = "start", "previous", "velocities"  # the earlier row that a row is compared with
 PAIR = "pair"  # the two poses of a row
 ALL, SOME, NO_STAMPS = "all", "some", "none"
 
 
 class Formula:
-    """An expression over rows: what it reads of each, what kind of thing it makes of it, and its numbers.
+    """An expression that is evaluated for each row: its inputs, the kind of its result, and its numbers.
 
-    The kind of a row is that of its shape, "" where it holds neither point nor pose.
-    columns: the columns, or keys, whose numbers it reads; reads_row: it reads the row's own point or pose
-    needs_time: it reads the row's own time; adds: rows keep their columns and results are added
-    shown: how its numbers are written, if not as they are
+    The kind of a row is that of its shape, "" for a row without a point or pose.
+    columns: the columns or keys that it reads as numbers; reads_row: it reads the point or pose of the row
+    needs_time: it reads the stamp of the row; adds: rows keep their columns, and the result is added
+    shown: how its numbers are written as words or members; None for plain numbers
     """
 
     columns: tuple[str, ...] = ()
@@ -47,30 +47,30 @@ class Formula:
     shown: Shown | None = None
 
     def kind(self, row: str) -> str:  # noqa: ARG002 - by default all rows get numbers alone
-        """Return whether a row becomes a pose, a point or a vector; "" for numbers alone, which are `extras`."""
+        """Return the kind of the result: pose, point or vector; "" for numbers alone, which are `extras`."""
         return ""
 
     def extras(self, row: str) -> tuple[str, ...]:  # noqa: ARG002 - none by default
-        """Name the numbers that come with a pose or point."""
+        """Name the numbers that follow those of a pose or point."""
         return ()
 
     def rename(self, row: str, parent: str | None, name: str | None) -> tuple[str | None, str | None]:  # noqa: ARG002
-        """Return the frames of the result of a row with these; raise FrametoolError where they do not fit."""
+        """Return parent and name of a result from those of its row; raises FrametoolError if they do not fit."""
         return parent, name
 
     def result(
         self, row: str, parts: Components, cells: Sequence[Number], times_ns: Number, xp: Namespace
     ) -> Components:
-        """Return the components of the result and then the extras; of floats raises FrametoolError where none are."""
+        """Return the components of the result, then the extras; raises FrametoolError for floats without a result."""
         raise NotImplementedError
 
 
 class Shown(NamedTuple):
-    """How the numbers of a formula are written in a row; nan is an empty cell, or null.
+    """How the numbers of a formula are written in a row; nan is an empty cell in tables and null in records.
 
-    words: in tables, the words that a number encodes, by its place
-    members: in records, what is under each key: a text, a word, or the places of its numbers
-    replaces: columns and members of these names give way, where no prefix makes others of them
+    words: in tables, the index of a number that is written as a word, and the words
+    members: in records, the value of each key: a text, a word, or the indices of its numbers
+    replaces: existing columns and keys with these names are replaced, unless a prefix makes the names different
     """
 
     words: Mapping[int, tuple[str, ...]]
@@ -102,21 +102,21 @@ class Shown(NamedTuple):
 
 
 class Operation(NamedTuple):
-    """What is done to each row: it is inverted if requested, then multiplied with fixed poses, then compared.
+    """The operation on each row: optional inversion, products with fixed poses, then an optional comparison.
 
-    left, right: applied as left @ row @ right[0] @ right[1] ..
+    left, right: the result is left @ row @ right[0] @ right[1] ..
     inverse: the row itself is inverted first
-    of: what a row is compared with; "" for nothing, "first" inverse(fixed) row, "second" inverse(row) fixed,
+    of: the pose that a row is compared with; "" for none, "first" inverse(fixed) @ row, "second" inverse(row) @ fixed,
         "pair" the two poses of a row, "previous" the row before and this one, "start" the first row and this one,
-        "velocities" as "previous", with the twist that leads from one row to the next in the time between them
+        "velocities" as "previous", with the twist from one row to the next over the time between them
     fixed: the pose that "first" and "second" need
-    moves: the row is moved rather than composed: points and vectors are allowed
-    turns: axes change: on the right only the rotation, the position, if there is one, stays as it is
-    mirrors: the row is seen in a mirror across y, before all that is on its left
-    formula: an expression, instead of all this; it is given points that are moved by their edge, or that edge alone
-    uncertain: what moves rows, each by its frame or its time, has a covariance that counts
-    similar: a scale with a pose counts, and is that of the result; multiples: so is that of a matrix s R
-    Poses are seven components, and may have a covariance or a scale behind them, as `geometry.rigid` has it.
+    moves: rows are expressed in another frame, so that points and vectors are allowed
+    turns: the axes convention changes: `right` is a rotation alone, which leaves the position unchanged
+    mirrors: the row is reflected across y, before `left` is applied
+    formula: an expression instead of all this; it receives a point moved by its edge, or without a point that edge
+    uncertain: the poses that move rows, by frame or by time, have covariances that are propagated
+    similar: the scale of a pose is applied and is part of the result; multiples: so is the scale of a matrix s R
+    A pose has seven components, with a scale eight, with a covariance 43, as in `geometry.rigid`.
     """
 
     left: Components | None = None
@@ -133,14 +133,14 @@ class Operation(NamedTuple):
     multiples: bool = False
 
     def extras(self, shape: Shape) -> tuple[str, ...]:
-        """Name the numbers that come with the result of a row, and have no place in the row as it was read."""
+        """Name the numbers of a row's result that have no column or key in the row as it was read."""
         if self.formula is not None:
             return self.formula.extras(shape.kind)
         compared = RELATIVE + VELOCITY * (self.of == VELOCITIES) if self.of and shape.kind == POSE else ()
         return compared if shape.covariance and not shape.rewritten else (*compared, *self.carried(shape))
 
     def carried(self, shape: Shape) -> tuple[str, ...]:
-        """Name the entries of the covariance, or the scale, that the results of rows of a shape have."""
+        """Name the covariance entries, or the scale, of the results of rows of a shape; () if they have neither."""
         stays = self.keeps_frames and not (self.uncertain or shape.inverse or shape.rewritten)
         passes = self.formula is not None or stays
         if passes or shape.kind not in (POSE, POINT, VECTOR):
@@ -148,7 +148,7 @@ class Operation(NamedTuple):
         sizes = {*map(len, filter(None, (self.left, *self.right, self.fixed)))}
         if SCALED in sizes or (1 in shape.covariance and not shape.sigma) or self.reads_scale(shape):
             return () if self.moves else (SCALE,)
-        of_position = shape.kind == POSE and 9 in shape.covariance and not shape.rewritten  # it stays what it is
+        of_position = shape.kind == POSE and 9 in shape.covariance and not shape.rewritten  # unchanged
         if of_position or not (self.uncertain or shape.covariance or UNCERTAIN in sizes):
             return ()
         from frametool.grammar.covariance import columns
@@ -156,46 +156,46 @@ class Operation(NamedTuple):
         return columns(36 if shape.kind == POSE else 9)
 
     def reads_scale(self, shape: Shape) -> bool:
-        """Return True if the matrix of a shape may be a multiple of one of a rotation, whose scale counts.
+        """Return True if the matrix of a shape may be s R, with a scale s that is part of the pose.
 
-        A scale that comes with it says it already.
+        Not if the row states the scale as a number of its own.
         """
         return self.multiples and shape.notation is not None and (
             shape.notation.representation.whole is not None and (1 not in shape.covariance or bool(shape.sigma))
         )
 
     def result_kind(self, kind: str) -> str:
-        """Return what a row of some kind becomes; "" for numbers alone."""
+        """Return the kind of the result of a row of some kind; "" for numbers alone."""
         return kind if self.formula is None else self.formula.kind(kind)
 
     @property
     def columns(self) -> tuple[str, ...]:
-        """Name the columns whose numbers are read with those of points and poses."""
+        """Name the columns that are read as numbers in addition to points and poses."""
         return () if self.formula is None else self.formula.columns
 
     @property
     def shown(self) -> Shown | None:
-        """Return how the numbers of an expression are written, if it says so."""
+        """Return how the numbers of a formula are written; None for plain numbers or without a formula."""
         return None if self.formula is None else self.formula.shown
 
     @property
     def only_adds(self) -> bool:
-        """Return True if rows keep their columns and results are added."""
+        """Return True if rows keep their columns and the result is added to them."""
         return self.formula is not None and self.formula.adds
 
     @property
     def keeps_child(self) -> bool:
-        """Return True if a result is the pose of what its row is the pose of: of a camera with the same axes."""
+        """Return True if a result is the pose of the same frame as its row: of a camera with the same axes."""
         return not (self.inverse or self.right or self.formula) and (self.of in ("", "first") or self.looks_back)
 
     @property
     def looks_back(self) -> bool:
-        """Return True if a row's result depends on the rows before it."""
+        """Return True if the result of a row depends on the rows before it."""
         return self.of in (START, PREVIOUS, VELOCITIES)
 
     @property
     def takes_points(self) -> bool:
-        """Return True if points and vectors have a result: where they are moved, and where they get other axes."""
+        """Return True if points and vectors have a result: if rows are moved, or change their axes."""
         return self.moves or self.turns
 
     @property
@@ -211,11 +211,11 @@ class Operation(NamedTuple):
 
     @property
     def keeps_position(self) -> bool:
-        """Return True if positions stay as they are written."""
+        """Return True if positions are unchanged, so that their text is kept."""
         return self.changes_nothing or (self.turns and self.left is None and not (self.mirrors or self.inverse))
 
     def move(self, shape: Shape, own: Components, extra: Components, edge: Components | None) -> Components:
-        """Move what is no pose, with its covariances, by `edge`, else by `left`; what else comes with it stays."""
+        """Move a point, vector, .. with its covariances by `edge`, else by `left`; other numbers are unchanged."""
         mover = edge or self.left
         if shape.kind == RATE:  # along the axes of the body
             mover = rigid.inverse(*self.right[0]) if self.right else None
@@ -240,11 +240,11 @@ class Operation(NamedTuple):
         before: Callable[[Components], tuple[Sequence[Components], Number]] | None = None,
         times_ns: Number = None,
     ) -> Components:
-        """Return what becomes of one thing of a shape, or of a column of them, and then what comes with it.
+        """Return the components of the result of one row, or of a column of rows, followed by its extra numbers.
 
-        rotation: makes the checked quaternion of a thing's own numbers
-        before: returns what a pose is compared with, it, and the time since that
-        times_ns: its own time
+        rotation: returns the checked quaternion of the numbers of a row
+        before: takes a pose; returns the pose that it is compared with, itself, and the seconds between them
+        times_ns: the stamp of the row
         """
         own, extra = numbers[: shape.own_size], tuple(numbers[shape.own_size :])
         if shape.sigma or (shape.covariance and shape.place is not None):
@@ -279,12 +279,12 @@ class Operation(NamedTuple):
             found = (*found, *extra)
         if shape.place is None or not self.keeps_frames:
             return found
-        from frametool.geometry.place import Spot, Unmoved  # with what it was read as, where nothing moves it
+        from frametool.geometry.place import Spot, Unmoved  # unmoved: with the numbers that were read
 
         return Unmoved(found, Spot(shape.place, numbers[: shape.place.size]))
 
     def pose(self, poses: Sequence[Components], edge: Components | None, xp: Namespace) -> Components:
-        """Return the resulting pose, how far it goes if poses are compared, and its covariance or scale, if any."""
+        """Return the resulting pose; distance and angle of compared poses; then its covariance or scale, if any."""
         result = poses[0]
         if self.inverse:
             result = rigid.inverse_full(result)
@@ -296,7 +296,7 @@ class Operation(NamedTuple):
         for right in self.right:
             result = rigid.compose_full(result, right)
         if self.moves and len(result) == SCALED:
-            return result[:EXACT]  # a pose that is scaled is one
+            return result[:EXACT]  # a pose that a similarity moves is a pose without a scale
         if not self.of:
             return result
         others = poses[1:] if self.fixed is None else (self.fixed,)
@@ -312,25 +312,25 @@ def _or_none(number: Number) -> Number | None:
 
 
 PLAIN = Shown({}, {})
-COMBINED = Operation(of="arguments")  # with each other, outside of here; they are only read
+COMBINED = Operation(of="arguments")  # the caller combines the poses; here they are only read
 
 
 def thing_pose(shape: Shape, own: Components, rotation: Callable[[Components], Components]) -> Rigid:
-    """Return the pose that numbers say, which may be the inverse of what is written."""
+    """Return the pose that the numbers of a row define; inverted if they are those of its inverse."""
     pose: Any = (*shape.position(own), *shape.turned(own, rotation(own)))
     return rigid.inverse(*pose) if shape.inverse else pose
 
 
 class Timed(NamedTuple):
-    """Where the stamps of rows are, and the poses that move from a frame (None: the one SOURCE) at such times.
+    """The stamps of rows, and the poses that move rows from a frame (None: the one SOURCE) at these times.
 
-    An expression has no such poses: it knows by itself what the stamps are for.
+    An expression has no such poses; it defines itself what the stamps are for.
 
     name: the column or key of the stamps; "" for the stamp in the header of each message
-    many: columns of poses at an array of nanoseconds, nan where there is no data
-    one: a pose at one time, or the reason raised
-    moves: True if what lies between a frame and the target depends on the time
-    width: how many numbers such a pose has, with its covariance if that counts
+    many: returns columns of poses at an array of nanoseconds, nan where there is no data
+    one: returns the pose at one time; raises FrametoolError with the reason if there is none
+    moves: returns True if the transform from a frame to the target depends on the time
+    width: number of components of such a pose: 7, or 43 with its covariance
     """
 
     name: str
@@ -345,7 +345,7 @@ class Timed(NamedTuple):
         return self.name or "header.stamp"
 
     def pose(self, frame: str | None, stamp_ns: int) -> Components:
-        """Return the pose at one time, to the bit as `many` does; raises FrametoolError if absent."""
+        """Return the pose at one time, with the same bits as from `many`; raises FrametoolError without data."""
         found = tuple(float(column[0]) for column in self.many(frame, [stamp_ns]))
         return found if found[0] == found[0] else self.one(frame, stamp_ns)
 
@@ -354,12 +354,12 @@ class RowOptions(NamedTuple):
     """How rows are read.
 
     poses: the number of poses in each row; 0 if rows only name frames
-    kind: pose, point, vector, twist or wrench; "" by their columns; kinds: of each of several points or poses in a row
-    given: the notation of rotations; given_place: the kind of geodetic position that unnamed numbers are
+    kind: pose, point, vector, twist or wrench; "" to decide by the columns; kinds: of each point or pose, if several
+    given: the representation of rotations; given_place: the geodetic format of numbers without names
     degrees: bare angles are in degrees; normalize: accept any non-zero quaternion
-    columns: the pose columns by name or number, one entry a pose; frames: columns that name a row's frame
-    stamp_or_weight_column: a column or key that is read with the pose; "" is the usual stamp
-    stamps: ALL rows have stamps if one has, or SOME; with NO_STAMPS that column is a weight or a label
+    columns: the pose columns by name or number, one entry per pose; frames: the columns with the frame of a row
+    stamp_or_weight_column: a further column or key to read; "" for the usual column of stamps
+    stamps: ALL rows need a stamp if one has it, or SOME; with NO_STAMPS that column holds weights or labels
     frame_is_counter: a decimal `frame` is a counter, because no frame has such a name
     """
 
@@ -380,13 +380,14 @@ class RowOptions(NamedTuple):
 class ResultOptions(NamedTuple):
     """How results are written.
 
-    notations: of rotations; () as they were read
+    notations: of rotations; () for those of the input
     default_notation: no option chose these notations; results without a rotation get none
-    keep, prefix: results are added to the columns of the input, with this prefix
+    keep_sign: quaternions keep their sign; precision: decimals, None for the shortest exact text
+    keep, prefix: add the result to the columns of the input; the prefix of its names
     unwrap: angles continue beyond half a turn
     all_numbers: write all numbers of a result, also unchanged ones
     rewrite_records: write results as new records, not into the text of the old ones
-    place: the format of positions on the Earth; last_place: that which they get later, of another format
+    place: the format of positions on the Earth; last_place: the one into which a writer converts them later
     """
 
     notations: tuple[Notation, ...] = ()
@@ -403,12 +404,13 @@ class ResultOptions(NamedTuple):
 
 
 class Request(NamedTuple):
-    """What one run does with its rows, how it reads them and how it writes the results.
+    """What is done with the rows of one run, how they are read, and how results are written.
 
-    pose_from_frame: the pose that moves a record expressed in a frame; timed: the poses at its own time
+    pose_from_frame: returns the pose that moves a record expressed in a frame; timed: the poses at a record's stamp
     rename: returns the (parent, name) of a result from those of its record
+    on_error: STOP, SKIP or NULL
     earth: the origin, the axes of rotations and the zone of all geodetic positions
-    offset_ns: added to all stamps, also `FromFirst`; window: the first and the last stamp that are not ignored
+    offset_ns: added to all stamps, an integer or `FromFirst`; window: the first and the last stamp of rows to use
     """
 
     operation: Operation = Operation()
@@ -431,7 +433,7 @@ class Request(NamedTuple):
         return self._replace(results=self.results._replace(**fields))
 
     def of_inverses(self) -> Request:
-        """Return what is done with the inverse of each row; its frames have changed places."""
+        """Return the request for the inverse of each row, with parent and name exchanged."""
         rename, operation = self.rename, self.operation
         return self._replace(
             operation=operation._replace(inverse=not operation.inverse),
@@ -440,17 +442,17 @@ class Request(NamedTuple):
 
     @property
     def in_order(self) -> bool:
-        """Return True if a row's result depends on the rows before it."""
+        """Return True if the order of rows matters: results depend on earlier rows, or the first is the origin."""
         takes_first = self.earth is not None and self.earth[0] is not None and self.earth[0].place is None
         return self.results.unwrap or self.operation.looks_back or takes_first
 
     @property
     def keeps_position(self) -> bool:
-        """Return True if positions stay as they are written."""
+        """Return True if positions are unchanged, so that their text is kept."""
         return self.operation.keeps_position and self.results.place is None
 
     def target(self, shape: Shape) -> Shape:
-        """Choose how results of things of a shape are written: as they were read unless set."""
+        """Return the shape of the result for rows of a shape: written as it was read, unless options change it."""
         asked, operation, in_place = self.results, self.operation, () if shape.rewritten else shape.covariance
         kind, extras = operation.result_kind(shape.kind), operation.extras(shape)
         target = Shape(kind, None, covariance=in_place, extras=extras, keep_sign=asked.keep_sign)
@@ -462,7 +464,7 @@ class Request(NamedTuple):
             if asked.place is not None and kind != POINT:
                 raise ValueInvalid(f"a {kind} has no place on the Earth; leave --to {asked.place.name} out")
             return target._replace(unit=self._unit(shape))
-        by_row = bool(self.rows.frames) or self.timed is not None  # which moves each its way
+        by_row = bool(self.rows.frames) or self.timed is not None  # each row is moved by its own pose
         poses = filter(None, (operation.left, *operation.right, operation.fixed))
         shifts = by_row or operation.formula is not None or any(any(pose[:3]) for pose in poses)
         there = shape.whole or shape.unit is not None
@@ -476,7 +478,7 @@ class Request(NamedTuple):
             written = tuple((each, each.in_degrees(self.rows.degrees)) for each in notations)
             target = target._replace(notations=written, whole=whole)
         else:
-            if shape.inverse:  # which is written anew, with all its numbers in one unit
+            if shape.inverse:  # rewritten with all its numbers, in one unit
                 shape = shape._replace(absent=(), radians_at=())
             ahead = 3 * (placed and shape.unit is None and not shape.whole)  # a position comes in front
             target = target._replace(
@@ -485,13 +487,13 @@ class Request(NamedTuple):
             )  # fmt: skip
         unit = (self._unit(shape) or 1.0) if placed and not target.whole else None
         is_matrix = len(target.notations) == 1 and target.notations[0][0].representation.whole is not None
-        if is_matrix and operation.carried(shape) == (SCALE,):  # the scale of results is in the matrix
+        if is_matrix and operation.carried(shape) == (SCALE,):  # the matrix contains the scale
             extras = extras[:-1] if extras[-1:] == (SCALE,) else extras
             return target._replace(unit=unit, scaled=True, extras=extras)
         return target._replace(unit=unit)
 
     def _unit(self, shape: Shape) -> Unit | None:
-        """Return how positions are written: as requested, as they were read, or in metres, as those of places are."""
+        """Return the unit of written positions: as requested, else as read; metres if geodetic or a new record."""
         asked = self.results
         if asked.place is not None and shape.unit is not None:
             return asked.place
@@ -499,7 +501,7 @@ class Request(NamedTuple):
         return 1.0 if own is not None and asked.all_numbers and (asked.notations or shape.notation is None) else own
 
     def for_kind(self, kind: str) -> Request:
-        """Return the request for rows of one kind, on which the frames of an expression's result depend."""
+        """Return the request for rows of one kind: the frames of a formula's result depend on it."""
         formula = self.operation.formula
         if formula is None:
             return self
@@ -511,7 +513,7 @@ class Request(NamedTuple):
 
 
 def target_of(style: Style, kind: str = POSE, *, placed: bool = True) -> Shape:
-    """Return how results are written in a style; placed: poses have a position."""
+    """Return the shape of results in a style; placed: poses have a position."""
     quaternions = notation("quaternion")
     asked = ResultOptions(style.notations or (quaternions,), keep_sign=style.keep_sign, place=style.place)
     shape = Shape(kind, 1.0 if placed else None, ((quaternions, False),) if kind == POSE else ())

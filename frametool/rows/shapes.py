@@ -1,4 +1,4 @@
-"""What the numbers of one row or record mean: a point, a vector or a pose, and in which notation.
+"""The meaning of the numbers of one row or record: a point, vector, pose, .., and in which notation and unit.
 
 Knows no text; works on floats and on arrays alike.
 """
@@ -19,15 +19,15 @@ if TYPE_CHECKING:
     from frametool.geometry.representations import Notation, Whole
 
 POINT, VECTOR, POSE, TWIST, WRENCH, ACCEL = "point", "vector", "pose", "twist", "wrench", "accel"
-ROTATION = "rotation"  # without a position, which no move gives it
-NORMAL, RATE = "normal", "rate"  # vectors that turn along with a point or pose; the one along the axes of its body
-ATTITUDE = "attitude"  # a rotation of the frame itself, seen from a fixed world
+ROTATION = "rotation"  # without a position, also after a move
+NORMAL, RATE = "normal", "rate"  # vectors rotated with a point or pose; RATE is along the body's axes
+ATTITUDE = "attitude"  # the rotation of the frame itself in a fixed world
 TURNED = (POSE, ROTATION, ATTITUDE)
 PARTS = {TWIST: ("linear", "angular"), WRENCH: ("force", "torque"), ACCEL: ("linear", "angular")}
 SIX = tuple(PARTS)  # two vectors, linear part first
-# the keys of the numbers in a mapping: these are lists, mappings, or single numbers
+# the keys of a mapping that hold the numbers, as lists, mappings or single numbers
 MAPPINGS = ((POINT, ("point",)), (VECTOR, ("vector",)), (POINT, ("xyz",)), *PARTS.items(), (POINT, ("x", "y", "z")))
-MOVERS: dict[str, Callable[..., Components]] = {  # by a pose, whose seven numbers come first
+MOVERS: dict[str, Callable[..., Components]] = {  # by a pose, whose seven components come first
     "": lambda *_: (),
     POINT: rigid.apply,
     VECTOR: lambda _x, _y, _z, *numbers: quaternion.rotate(*numbers),
@@ -43,34 +43,34 @@ IDENTITY = (0.0, 0.0, 0.0, 1.0)
 NOWHERE = (0.0, 0.0, 0.0, *IDENTITY)
 TURN = 6.283185307179586
 TO_DEGREES = 180.0 / 3.141592653589793
-AS_READ = "lat lon alt as read"  # of a point of ecef: of its row, for what is written of them again
-FLAT = 1e-9  # radians, metres: what a number without a column may be
+AS_READ = "lat lon alt as read"  # extra of a point in ECEF: lat, lon, alt of its row, to be written again
+FLAT = 1e-9  # radians, metres: the largest size of a result that has no column
 LEAVES_PLANE = "the result leaves the plane: {} is {:g} and has no column; give --to rpy"
-# how many make a metre, where they differ of x, y, z each; or how positions on the Earth are written
+# units per metre, for x, y, z separately if they differ; or the notation of positions on the Earth
 Unit: TypeAlias = "float | tuple[float, float, float] | Place"
 
 
 def six_names(kind: str) -> list[str]:
-    """Name the numbers of a twist or wrench as columns."""
+    """Name the columns of the six numbers of a twist, wrench or acceleration."""
     return [f"{part}_{axis}" for part in PARTS[kind] for axis in "xyz"]
 
 
 class Shape(NamedTuple):
-    """The numbers of a row in order: position (3, if any), then rotation (if any); or those of a whole matrix.
+    """The meaning of the numbers of a row, in order: position, rotation, then covariances and extras.
 
-    One shape is read, and one is written: the result.
+    A row is read as one shape and its result is written as another, the target.
     kind: point, vector, pose, rotation, attitude, twist, wrench or accel; "" for no numbers
-    unit: how many of the position's numbers make a metre; None where there is no position
-    notations: that of the rotation, with whether its angles are degrees; of a result there may be several
-    whole: the numbers are those of a whole pose
-    inverse: what is written is the inverse
-    covariance: how many numbers each of the covariances has that come last; one is a scale
-    sigma: of six independent axes, the place of each one's number among these, -1 for 0, and its unit; () for entries
-        that have no place of their own in the result, which names them anew; None for those that have
-    radians_at: which of the rotation's numbers are radians where the others are degrees
-    absent: which numbers have no column and count as 0; of a result they have to be 0
-    extras: the names of the numbers that come with it
-    keep_sign: its quaternions keep their sign; scaled: its matrix is s R, of the scale that comes last
+    unit: units of the position per metre, or its geodetic notation; None without a position
+    notations: of the rotation, each with True for angles in degrees; a result may have several
+    whole: the numbers are those of a whole pose, position and rotation in one matrix
+    inverse: the row holds the inverse of the pose
+    covariance: the size of each covariance, whose numbers follow the pose; 1 is a scale
+    sigma: for a covariance from six independent sigmas, the index of each one's number (-1 for 0) and its unit; () for
+        entries that the result writes under new names; None for entries that are replaced in place
+    radians_at: the numbers of the rotation in radians, if the others are in degrees
+    absent: the numbers without a column, which count as 0; in a result they must be 0
+    extras: the names of further numbers
+    keep_sign: quaternions keep their sign; scaled: the matrix is s R, with the scale s as the last component
     """
 
     kind: str
@@ -88,32 +88,32 @@ class Shape(NamedTuple):
 
     @property
     def notation(self) -> Notation | None:
-        """Return the notation of the rotation, of several the first."""
+        """Return the notation of the rotation, the first of several; None without a rotation."""
         return self.notations[0][0] if self.notations else None
 
     @property
     def degrees(self) -> bool:
-        """Return True if its angles are degrees."""
+        """Return True if the angles of this notation are in degrees."""
         return bool(self.notations) and self.notations[0][1]
 
     @property
     def rewritten(self) -> bool:
-        """Return True if the result names the entries of the first covariance anew."""
+        """Return True if the result writes the entries of the first covariance under new names."""
         return self.sigma is not None
 
     @property
     def joined(self) -> Whole | None:
-        """Return how position and rotation are written in one, if they are."""
+        """Return the rule that joins position and rotation in one matrix; None if they are separate."""
         return self.notation.representation.whole if self.whole and self.notation else None
 
     @property
     def size(self) -> int:
-        """Count the numbers of a row, or of a result with what comes with it."""
+        """Return the number of all numbers, with covariances and extras."""
         return self.own_size + sum(self.covariance) + len(self.extras)
 
     @property
     def own_size(self) -> int:
-        """Count the numbers of the thing itself, without its covariance."""
+        """Return the number of numbers without covariances and extras."""
         return self._full - len(self.absent)
 
     @property
@@ -124,32 +124,32 @@ class Shape(NamedTuple):
 
     @property
     def place(self) -> Place | None:
-        """Return how its position on the Earth is written, None of any other."""
+        """Return the notation of its position on the Earth; None for any other position."""
         return place_of(self.unit)
 
     @property
     def _there(self) -> list[int]:
-        """Return which number of the rotation each number of a row is; below 0 of the position."""
+        """Return for each number of a row its index in the rotation; below 0 in the position."""
         return [place - count_of(self.unit) for place in range(self._full) if place not in self.absent]
 
     @property
     def position_size(self) -> int:
-        """Count the numbers of the position in a row."""
+        """Return the number of position numbers in a row; 0 for a matrix of the whole pose."""
         return 0 if self.whole else sum(index < 0 for index in self._there)
 
     @property
     def rotation_at(self) -> tuple[int, ...]:
-        """Return where in a row the rotation's numbers are."""
+        """Return the indices of the rotation's numbers in a row."""
         every = range(self.own_size)
         return tuple(self.joined.split(every)[1] if self.joined else every[self.position_size :])
 
     def number_at(self, index: int) -> int:
-        """Return where in a row a number of the rotation is that has a column."""
+        """Return the index in a row of the rotation's number `index`, which must have a column."""
         return self.rotation_at[index] if self.joined else self._there.index(index)
 
     @property
     def angles(self) -> list[bool | None]:
-        """Return whether each of the numbers is an angle in degrees; None where it is no angle."""
+        """Return for each number True for an angle in degrees, False for one in radians, None for any other number."""
         found: list[bool | None] = [None] * count_of(self.unit)
         for notation, degrees in self.notations:
             row = notation.representation
@@ -159,21 +159,21 @@ class Shape(NamedTuple):
         return [each for place, each in enumerate(found) if place not in self.absent]
 
     def in_degrees(self, place: int) -> bool | None:
-        """Return True if a row's number is an angle in degrees; None if it is no angle."""
+        """Return True for an angle in degrees, False for one in radians, None for any other number."""
         return dict(enumerate(self.angles)).get(place)
 
     def angle_columns(self) -> list[tuple[int, float]]:
-        """Return which of the numbers are angles, each with the size of a full turn."""
+        """Return the index of each angle, with the size of a full turn in its unit."""
         return [(at, 360.0 if degrees else TURN) for at, degrees in enumerate(self.angles) if degrees is not None]
 
     def read(self, place: int, text: str) -> float:
-        """Read a row's number: an angle, or a length in metres, may have a unit of its own."""
+        """Read a number of a row; an angle, or a length in metres, may state its own unit."""
         is_length = self.place is None and place < self.position_size
         metres = is_length and _each(self.unit or 1.0)[self._there[place]] == 1.0
         return float(read_number_or_angle(text, self.in_degrees(place), metres=metres))
 
     def position(self, numbers: Sequence[Any]) -> Components:
-        """Return x, y, z in metres; 0 where there is no position."""
+        """Return x, y, z in metres from the numbers of a row; 0 without a position."""
         if self.joined:
             position: Components = self.joined.split(numbers)[0]
             return position
@@ -188,12 +188,12 @@ class Shape(NamedTuple):
         return x / a, y / b, z / c
 
     def turned(self, numbers: Sequence[Any], rotation: Components) -> Components:
-        """Return the checked rotation of a row, as x y z w, in the frame that its position is in."""
+        """Return the checked quaternion of a row; next to a geodetic position it is converted to the axes of ECEF."""
         place = self.place
         return rotation if place is None or self.notation is None else place.turned(numbers[: place.size], rotation)
 
     def rotation(self, numbers: Sequence[Any]) -> Components:
-        """Return the rotation's numbers in the order of its columns, angles in one unit."""
+        """Return the numbers of the rotation in the order of its notation, all angles in one unit."""
         if self.joined:
             rotation: Components = self.joined.split(numbers)[1]
             return rotation
@@ -204,12 +204,12 @@ class Shape(NamedTuple):
 
     @property
     def bare_angles(self) -> tuple[int, ...]:
-        """Return which of the rotation's numbers are angles without a stated unit, taken as radians."""
+        """Return the indices of the rotation's numbers that are angles without a stated unit, read as radians."""
         fmt = self.notation
         return () if fmt is None or self.degrees or fmt.degrees is not None else tuple(fmt.representation.angles)
 
     def _with_absent(self, numbers: Sequence[Any]) -> Sequence[Any]:
-        """Put zeros where a row has no number."""
+        """Insert zeros for the numbers that have no column."""
         if not self.absent:
             return numbers
         full = list(numbers)
@@ -221,11 +221,11 @@ class Shape(NamedTuple):
 
     @property
     def position_columns(self) -> list[str]:
-        """Name the numbers of the position."""
+        """Name the columns of the position."""
         return list("xyz" if self.place is None else self.place.columns) if self.unit is not None else []
 
     def written(self, parts: Components, xp: Namespace) -> list[Any]:
-        """Return all numbers of a result: those of the thing itself, then what comes with it as it is."""
+        """Return all numbers of a result: those of the pose or point as they are written, then the others unchanged."""
         own = 6 if self.kind in SIX else 3 if self.kind in (POINT, VECTOR, NORMAL, RATE) else 7
         full = self._all_written(parts[:own], xp, parts[-1] if self.scaled else None, getattr(parts, "read", None))
         if self.absent:
@@ -233,14 +233,14 @@ class Shape(NamedTuple):
         return [*full, *parts[own : len(parts) - self.scaled]]
 
     def left_out(self, parts: Components, xp: Namespace) -> list[tuple[str, Any]]:
-        """Return the numbers of a result without a column, by name; a row where one is above FLAT is bad."""
+        """Return the numbers of a result that have no column, with their names; a row with one above FLAT is bad."""
         if not self.absent:
             return []
         full, names = self._all_written(parts, xp), [*self.position_columns, *self.names]
         return [(names[place], full[place]) for place in self.absent]
 
     def _all_written(self, parts: Components, xp: Namespace, scale: Any = None, read: Spot | None = None) -> list[Any]:
-        """Return the numbers of a result: the position, then each notation's; or those of a whole matrix."""
+        """Return the numbers of a result as written: the position, then each notation, or those of a whole matrix."""
         if self.kind in SIX:
             return list(parts)
         position: list[Any] = []
@@ -270,13 +270,13 @@ class Shape(NamedTuple):
 
     @property
     def names(self) -> list[str]:
-        """Name the numbers of all notations as columns; of a whole pose all of them."""
+        """Name the columns of all notations; of a matrix of the whole pose all columns."""
         if self.joined:
             return list(self.joined.columns)
         return [name for notation, degrees in self.notations for name in notation.columns_in(degrees=degrees)]
 
     def locked(self, parts: Components) -> Any:
-        """Return where Euler angles among the notations are not unique; None if there are none."""
+        """Return where the first Euler angles among the notations are not unique; None without Euler angles."""
         for notation, _ in self.notations:
             if notation.euler_axes and len(parts) >= 7:
                 x, y, z, w = parts[3:7]
@@ -285,27 +285,27 @@ class Shape(NamedTuple):
 
 
 def place_of(unit: Unit | None) -> Place | None:
-    """Return a unit that is a way to write positions on the Earth, None for any other."""
+    """Return a unit if it is a notation of positions on the Earth; else None."""
     return None if unit is None or type(unit) is float or type(unit) is tuple else unit  # type: ignore[return-value]
 
 
 def count_of(unit: Unit | None) -> int:
-    """Count the numbers of a position: three, or those of a place; none without one."""
+    """Return the number of numbers of a position: 3, or those of a geodetic notation; 0 without a unit."""
     place = place_of(unit)
     return place.size if place is not None else 3 * (unit is not None)
 
 
 def _each(unit: Any) -> tuple[float, float, float]:
-    """Return the unit of x, y and z each."""
+    """Return the unit of x, of y and of z."""
     return unit if type(unit) is tuple else (unit, unit, unit)
 
 
 def checked_rotation(
     shape: Shape, values: Sequence[float], *, normalize: bool
 ) -> tuple[Quaternion, list[tuple[str, str]]]:
-    """Return the quaternion of a record's numbers, and what its check warned of as (rule, sentence).
+    """Return the quaternion of a record's numbers, and the warnings of its check as (rule, message).
 
-    Raises ValueInvalid for what is no rotation.
+    Raises ValueInvalid for an invalid rotation.
     """
     if shape.notation is None:
         return IDENTITY, []
@@ -317,12 +317,12 @@ def checked_rotation(
 
 
 def wrong_tail(wanted: Sequence[float], found: Sequence[float]) -> str:
-    """Return the message that the last row of a 4x4 matrix is not what it always is."""
+    """Return the error message for a 4x4 matrix with a wrong last row."""
     expected, actual = (" ".join(f"{value:g}" for value in row) for row in (wanted, found))
     return f"the last row of a 4x4 pose is {expected}, found {actual}"
 
 
 def doubt(shape: Shape, angle: float, remedy: str) -> str:
-    """Wonder whether an angle beyond a full turn is meant in degrees."""
+    """Return the warning for an angle of more than a full turn: it may be in degrees."""
     name = shape.notation.representation.name if shape.notation else ""
     return f"{name} {angle:g} is more than a full turn in radians; degrees? {remedy}"

@@ -1,4 +1,4 @@
-"""The pieces that the text of a row is made of: what stays of the input, and what stands in it of the result."""
+"""The pieces that the text of a row is assembled from: unchanged stretches of the input, and parts of the result."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ if TYPE_CHECKING:
 
 
 class In(NamedTuple):
-    """A stretch of the input, by its key among the spans a format found."""
+    """An unchanged stretch of the input; part: its key in `Block.parts`."""
 
     part: Any
 
 
 class Out(NamedTuple):
-    """Numbers of the result, from the first up to before the last, each followed by `between` but for the last."""
+    """Numbers `first` to `last` - 1 of the result, with `between` after each but the last."""
 
     first: int
     last: int
@@ -25,32 +25,32 @@ class Out(NamedTuple):
 
 
 class Word(NamedTuple):
-    """A number of the result in other words than digits; nan is a row without it."""
+    """A number of the result that is written as a word, such as a UTM zone; text: converts it, also nan."""
 
     number: int
     text: Callable[[float], bytes]
 
 
 def one_of(words: Sequence[str], quote: bytes = b"", null: bytes = b"") -> Callable[[float], bytes]:
-    """Return what writes a number as the word that it encodes, between quotes or not: the zone of UTM."""
+    """Return a function that writes a number as the word with this index, with `quote` around it; `null` for nan."""
     return lambda number: quote + words[int(number)].encode() + quote if number == number else null  # noqa: PLR0124 - nan
 
 
 class Renamed(NamedTuple):
-    """The name of a frame in the result, in place of the one that begins at `at` in the text that was learned."""
+    """The name of a frame of the result, for the name at offset `at` of the text that a template was learned from."""
 
     at: int
     text: bytes
 
 
 class Const(NamedTuple):
-    """The same text in every row."""
+    """Text that is the same in every row."""
 
     text: bytes
 
 
 class IfLocked(NamedTuple):
-    """Text that is only in rows whose angles are not unique."""
+    """Text that is written only in rows whose Euler angles are not unique."""
 
     text: bytes
 
