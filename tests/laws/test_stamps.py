@@ -112,3 +112,6 @@ def test_a_cloud_of_poses_keeps_the_stamps_that_were_written_into_it(run: Run) -
     assert run("convert", "-o", "poses.pcd", stdin=table).status == 0
     assert run("convert", "-i", "poses.pcd", "-f", "tum").out == at
     assert run("resample", "poses.pcd", "--rate", "1", "-f", "tum").out == run("resample", "poses.csv", "--rate", "1", "-f", "tum", files={"poses.csv": table}).out
+    record = json.dumps({"stamp": 1.5, "xyz": [1, 2, 3], "xyzw": [0, 0, 0, 1]})
+    assert run("convert", "-o", "poses.ply", stdin=record).status == 0  # as doubles: it has no such integers
+    assert json.loads(run("convert", "-i", "poses.ply", "-f", "json").out)["stamp_ns"] == 1500000000

@@ -94,8 +94,9 @@ class ColumnRows(PlannedRows):
         names = file.names
         header = tuple(quoted(name).encode() for name in names or ())
         table = Table(b",", names, file.width, header=header, source=source, normals=file.vectors)
+        is_stamped = dict(zip(names or (), file.kinds, strict=False)).get(STAMP_KEYS[0]) == STAMP_NS
         try:  # `t` or `time` of a cloud is what its sensor counts, in whatever unit; what we write there says it
-            super().__init__(table._replace(stamped=not file.vectors or STAMP_KEYS[0] in (names or ())), request)
+            super().__init__(table._replace(stamped=is_stamped or not file.vectors), request)
         except FormatError as error:
             error.line = 0  # the names of columns are in no line here
             raise
