@@ -1,1 +1,1 @@
-"""Output for people: aligned text, charts, pictures and pages; the only room that imports rich."""
+"""Output for people: aligned text, charts, pictures and pages; the only package that imports rich."""

@@ -117,17 +117,17 @@ def write_table(found: Sequence[dict[str, Any]], fmt: str = "text") -> str:
 
 
 WIDE, HIGH = 412.0, 112.0  # pixels of a chart
-LEFT, TOP, RIGHT, BOTTOM, GAP = 54.0, 40.0, 14.0, 42.0, 68.0  # around a chart, and between two of a column
+LEFT, TOP, RIGHT, BOTTOM, GAP = 54.0, 40.0, 14.0, 42.0, 68.0  # pixels around a chart, and between two of a column
 ROW = 38.0  # pixels for the box of an estimate and its name
-STRETCHES, FEWEST = 200, 20  # of all paths together, and at least of each; only extremes of a stretch are drawn
-LEVELS, BINS = 12, 30  # of the error: colours along a path, columns of a histogram
+STRETCHES, FEWEST = 200, 20  # parts of all paths together, and at least of each; of a part only extremes are drawn
+LEVELS, BINS = 12, 30  # number of colours for the error along a path, and of columns in its histogram
 ERROR_STOPS = ((47, 108, 216), (190, 90, 190), (235, 94, 20))  # visible on white and on dark
 SHADES = [pictures.shade_of(level / (LEVELS - 1), ERROR_STOPS) for level in range(LEVELS)]
 STILL = 1e-6  # metres: a smaller path is a point
 
 
 class Curve(NamedTuple):
-    """A comparison to draw: its name and colour, the indices of the pairs that are drawn, and their times."""
+    """A comparison to draw: its name and colour, the indices of the drawn pairs, and their times in seconds."""
 
     found: Comparison
     name: str
@@ -136,7 +136,7 @@ class Curve(NamedTuple):
     times: list[float]
 
     def line(self, name: str, colour: str, values: Any) -> ChartLine:
-        """Return the line of a value over time, at the pairs that are drawn."""
+        """Return the line of a value over time, at the drawn pairs."""
         return ChartLine(name, colour, [*zip(self.times, values[self.chosen].tolist(), strict=True)], 1.2)
 
 
@@ -181,7 +181,7 @@ def write_report(found: Sequence[Comparison], fmt: str, command: str) -> str:
 
 
 def _curve(found: Comparison, at: int, count: int) -> Curve:
-    """Choose the pairs of a comparison that are drawn: the minimum and maximum of each stretch, and both ends."""
+    """Choose the pairs of a comparison to draw: the extremes of its errors in each part of the path, and both ends."""
     ate, stamps = found.ate, found.pairs.ref.stamps_ns
     chosen = np.arange(found.pairs.ref.size)
     times = chosen if stamps is None else (stamps - stamps[0]) / 1e9
@@ -286,7 +286,7 @@ def _distribution(curves: Sequence[Curve]) -> Picture:
 
 
 def _by_length(curves: Sequence[Curve], numbers: Sequence[dict[str, Any]]) -> Picture | None:
-    """Draw errors by length, of KITTI or else of deltas in metres; return None for fewer than three lengths."""
+    """Draw relative errors by length, of KITTI's segments or of deltas in metres; None for fewer than 3 lengths."""
     lines = []
     for curve, each in zip(curves, numbers, strict=True):
         points = [(row["length_m"], row["percent"]) for row in (each["kitti"] or {"lengths": []})["lengths"]]

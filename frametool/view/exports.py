@@ -55,7 +55,7 @@ if TYPE_CHECKING:
 
     Stroke = tuple[str, Pen, list[Point]]  # turtle, pen, and a line drawn with it; metres, y up
 
-PIECES, LAST_SHADE = 24, 0.85  # of a trail, from dark at its beginning to a green that is visible on white
+PIECES, LAST_SHADE = 24, 0.85  # colours along a trail: from dark at its beginning to a green that is visible on white
 WIDTH, HEIGHT = 1000.0, 700.0
 SIZE = Size(WIDTH, HEIGHT, margin=70.0, axes=(14.0, 46.0), cell=(4, 4), line=16.0, measure=text_width)
 CORNER = 46.0  # pixels from the corner to the origin of the legend's axes
@@ -130,7 +130,7 @@ BODY = (*((x, y, 4.0) for x in (-9.0, 9.0) for y in (-11.0, 11.0)), (17.0, 0.0, 
 
 
 def run_picture(scene: Scene) -> tuple[Callable[[SimulationStep], None], Callable[[], Picture]]:
-    """Return a function that collects the steps of a run, and one that then draws it; turtles at rest take no memory.
+    """Return a function that collects the steps of a run, and one that then draws them; turtles at rest use no memory.
 
     The picture shows the world with trails, the turtles at the end, and charts if there are followers.
     """
@@ -353,7 +353,7 @@ def _packed(letter: str, numbers: Iterable[float]) -> bytes:
 
 
 def run_page() -> tuple[Callable[[SimulationStep], None], Callable[[], str]]:
-    """Return a function that collects the transforms of a run, and one that then returns their page."""
+    """Return a function that collects the transforms of a run, and one that then returns a page of them."""
     buffer = TransformBuffer(name="run")
 
     def watch(step: SimulationStep) -> None:
@@ -367,7 +367,7 @@ SLIDER_KEYS = ("name", "kind", "axis", "anchor", "rest", "lower", "upper")
 
 
 def joint_sliders(scene: FrameScene) -> dict[str, list[dict[str, Any]]]:
-    """Return the revolute and prismatic joints with a constant value, and the links that they move, for the page."""
+    """Return, for the page, the revolute and prismatic joints with a constant value, and the links that they move."""
     driven: list[tuple[Any, Any]] = []  # joints and their values
     moved: list[dict[str, Any]] = []
     for values, links, _ in scene.tree.robots:

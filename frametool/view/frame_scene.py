@@ -1,6 +1,6 @@
 """Choose the frames of a tree to draw, in a fixed frame and at a time, with poses and trails in metres.
 
-Shared by the page, SVG, PNG, GLB and the terminal.  Also the orthographic projection to pixels, and the placement of
+Common to the page, SVG, PNG, GLB and the terminal.  Also the orthographic projection to pixels, and the placement of
 names without overlaps, in a grid of cells.
 """
 
@@ -45,7 +45,7 @@ MOST_STAMPS = 4000  # of a trail; if there are more, only every second, third, .
 
 
 def _on_ground(tree: Frames, ground: Ground | None) -> tuple[Ground | None, Frames]:
-    """Return the ground, and the tree with the ground instead of ecef; (None, tree) without frames on the Earth.
+    """Return the ground, and the tree with it in place of ecef; (None, tree) without frames on the Earth.
 
     ground: by default at the first frame in ecef, a static one if there is any
     """
@@ -99,7 +99,7 @@ class FrameScene:
             raise ValueInvalid("no frames in it: nothing to draw")
         self.ground: Ground | None = None
         if tree.resolve_name(EARTH) not in (fixed, below, target, source):
-            # from the Earth's centre nothing could be seen
+            # in ecef, frames are too far from the origin to be seen
             self.ground, tree = _on_ground(tree, ground)
         tree.require(*filter(None, (fixed, below, target, source)))
         self.tree = tree
@@ -144,7 +144,7 @@ class FrameScene:
         for name in (name for name in self.tracks if name in self.chosen):
             import numpy as np
 
-            # looked up at, and between, the stamps of all moving frames on its path
+            # poses at, and between, the stamps of all moving frames on its path
             movers = self._movers_above(name) | self._movers_above(self.fixed)
             stamps = sorted({stamp for mover in movers for stamp, _, _ in self.tracks[mover].walk()})
             stamps = stamps[:: -(-len(stamps) // MOST_STAMPS) or 1]
@@ -173,7 +173,7 @@ class FrameScene:
 
 
 def can_be_drawn(point: Sequence[float]) -> bool:
-    """Return True if a point is not too far away to be drawn."""
+    """Return True if a point is near enough to be drawn."""
     return all(abs(value) < FURTHEST for value in point)
 
 
@@ -186,7 +186,7 @@ def _in_order(tree: Frames) -> list[str]:
     while waiting:
         order.append(waiting.pop())
         waiting += reversed(children.get(order[-1], []))
-    return [*dict.fromkeys([*order, *tree.frames])]  # those in a cycle of first parents last
+    return [*dict.fromkeys([*order, *tree.frames])]  # frames in a cycle of first parents come last
 
 
 # name -> azimuth and elevation of the eye, radians; front looks along -x, side along +y, top down
@@ -217,7 +217,7 @@ def parse_eye(text: str) -> Eye:
 AXIS_PART = 0.55  # length of a drawn axis, in median distances between a frame and its parent
 USUAL_LINK = 0.5  # metres, if there is no such distance
 LEAST = 1e-9  # metres; closer frames are on one point
-# the cluster reaches REACH times the distance within which NEAR_PART of the frames are, if one is VERY_FAR times as far
+# radius of the cluster: REACH times that of NEAR_PART of the frames, if some frame is VERY_FAR times as far away
 REACH, NEAR_PART, VERY_FAR, FEWEST = 2.5, 0.7, 4.0, 4
 
 
@@ -249,7 +249,7 @@ class Size(NamedTuple):
 
 
 class Projection:
-    """The projection of a scene: pixels of its frames, and the length of their axes.
+    """The projection of a scene to pixels.
 
     poses: name -> pose in `fixed`, of the drawn frames
     trails: of the moving frames
@@ -257,11 +257,11 @@ class Projection:
     origins: name -> pixels; nearest_last: the names from the farthest to the nearest
     axis: length of a drawn axis in metres
     scale: pixels per metre
-    view: the directions right, up and toward the eye
+    view: unit vectors to the right, up, and toward the eye
     """
 
     def __init__(self, scene: FrameScene, size: Size, eye: Eye = EYES["slanted"], *, most: bool = False) -> None:
-        """Fit the scene into the picture; most: leave out a few frames that are far from the others."""
+        """Fit the scene into the picture; most: ignore a few frames that are far from the others."""
         self.scene, self.size = scene, size
         sa, ca, se, ce = (function(angle) for angle in eye for function in (math.sin, math.cos))
         self.view = (-sa, ca, 0.0), (-se * ca, -se * sa, ce), (ce * ca, ce * sa, se)
@@ -292,7 +292,7 @@ class Projection:
         self.axis = min(max(AXIS_PART * usual, shortest), longest)
 
     def cluster(self) -> list[str]:
-        """Return the frames of the cluster in which most are; all if no frame is far from it."""
+        """Return the frames near the median position, or all frames if none is far from these."""
         middle = [sorted(column)[len(self.poses) // 2] for column in zip(*self.poses.values(), strict=True)][:3]
         away = {name: math.dist(pose[:3], middle) for name, pose in self.poses.items()}
         far = sorted(away.values())
@@ -305,7 +305,7 @@ class Projection:
         return 0.0 <= place.x < self.size.width and 0.0 <= place.y < self.size.height
 
     def turned(self, point: Sequence[float]) -> Point:
-        """Return a point's metres to the right, up, and toward the eye."""
+        """Return the coordinates of a point along `view`: metres to the right, up, and toward the eye."""
         (a, b, c), (d, e, f), (g, h, i) = self.view
         x, y, z = point
         return a * x + b * y + c * z, d * x + e * y + f * z, g * x + h * y + i * z
@@ -330,7 +330,7 @@ class Projection:
     def label(
         self, words: str, length: float, point: Flat, left: float, middle: float, away: float = 0.0
     ) -> Iterator[Label]:
-        """Yield a label at a position, moved to the nearest cells, if it is inside the picture."""
+        """Yield a label at a position, aligned with the cells, if it is inside the picture."""
         (wide, high), line = self.size.cell, self.size.line
         left, top = wide * round(left / wide), high * round((middle - line / 2.0) / high)
         right, bottom = left + wide * math.ceil(length / wide), top + line
@@ -338,7 +338,7 @@ class Projection:
             yield words, point, (left - MARGIN, top, right + MARGIN, bottom), away
 
     def ground(self) -> tuple[float, list[tuple[Point, Point, bool]]]:
-        """Return the grid on z = 0: its spacing in metres, and its lines with True for those through the origin."""
+        """Return the grid on z = 0: its spacing in metres, and its lines (begin, end, True if through the origin)."""
         wide = max(self.high[0] - self.low[0], self.high[1] - self.low[1], 4.0 * self.axis)
         step = rounded(wide / 8.0)
         first = [math.floor(low / step - 0.6) for low in self.low]
@@ -362,7 +362,7 @@ def _bounds(points: Iterable[Sequence[float]]) -> tuple[list[float], list[float]
     return [min(column) for column in columns], [max(column) for column in columns]
 
 
-DISTANCES = (0.6, 1.1, 1.75, 2.7, 3.9, 5.4)  # lines from a frame to its name
+DISTANCES = (0.6, 1.1, 1.75, 2.7, 3.9, 5.4)  # of a name from its frame, in heights of a line
 SIDES = ((1.0, -0.6), (1.0, 0.6), (-1.0, -0.6), (-1.0, 0.6), (0.0, -1.3), (0.0, 1.3), (1.0, 0.0), (-1.0, 0.0))
 SAME = 3.0  # pixels within which frames share a name
 MOST_SHARED = 2  # names in one label
@@ -378,7 +378,7 @@ def placed_names(
 
     Names never overlap each other and, if possible, no axis: each is at the first free spot, or else at the first
     one that overlaps only axes.
-    blocked: boxes without names.  outside: spots for further names, best first, which are placed before the others
+    blocked: boxes to keep free.  outside: spots for further names, best first, which are placed before the others
     Returns the labels, and the number of names without a spot.
     """
     (wide, high), line, measure = flat.size.cell, flat.size.line, flat.size.measure

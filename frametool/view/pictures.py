@@ -1,7 +1,7 @@
-"""Draw static pictures of SVG elements in pixels with y down, and write SVG, HTML or PNG; overlays on camera images.
+"""Draw static pictures of SVG elements, in pixels with y down, and write them as SVG, HTML or PNG.
 
-A colour is `#rrggbb` or a name in PALETTE, with a light and a dark value.  Only PNG needs a library, matplotlib.
-Also charts, and the HTML shell of all pages.
+Also charts, the HTML shell of all pages, and overlays on camera images.  A colour is `#rrggbb` or a name in PALETTE,
+with a light and a dark value.  Only PNG needs a library, matplotlib.
 """
 
 from __future__ import annotations
@@ -108,7 +108,11 @@ def svg_text(x: float, y: float, text: str, colour: str = "ink", anchor: str = "
 
 
 class Picture(NamedTuple):
-    """Shapes from back to front; corner: the coordinates of the upper left corner; decimals: of coordinates in SVG."""
+    """Shapes from back to front.
+
+    corner: the coordinates of the upper left corner; decimals: of coordinates in SVG
+    notes: what the picture does not show, for messages
+    """
 
     width: float
     height: float
@@ -161,7 +165,7 @@ def svg_element(picture: Picture, before: str = "", place: str = "") -> str:
 
 
 def _attribute(value: Any, decimals: int) -> str:
-    """Return the text of a number with some decimals, of several separated by spaces, or of a string."""
+    """Format a number with some decimals, several separated by spaces, or a string."""
     if isinstance(value, str):
         return value
     if isinstance(value, tuple):
@@ -211,7 +215,7 @@ def page_file(name: str) -> str:
 
 
 def filled(name: str, **texts: str) -> str:
-    """Return the text of a file in the folder `page` with texts for its placeholders."""
+    """Return the text of a file in the folder `page` with its placeholders replaced."""
     return Template(page_file(name)).substitute(texts)
 
 
@@ -224,7 +228,7 @@ def write_picture(picture: Picture, suffix: str) -> str | bytes:
     return write_html(picture.title, f"<main>\n<figure>\n{svg_element(picture)}</figure>\n</main>\n")
 
 
-LEAST_SPAN, FURTHEST = 1e-300, 1e300  # of values on an axis; those beyond are drawn at its end
+LEAST_SPAN, FURTHEST = 1e-300, 1e300  # least range of an axis, and largest value, to which larger ones are clamped
 
 
 class ChartLine(NamedTuple):
@@ -242,10 +246,10 @@ def chart(
     area: Box, names: tuple[str, str], lines: Sequence[ChartLine] = (), ends: Sequence[Point] = (), *,
     is_scaled: bool = True,
 ) -> tuple[list[SvgElement], Place]:  # fmt: skip
-    """Draw two axes, lines and a legend; if the legend is too long it has only the dashed lines.
+    """Draw two axes, lines and a legend; a legend that is too long has only the dashed lines.
 
     area: left, top, width and height without the labels.  names: titles of the x and the y axis, with units.
-    ends: smallest and largest x and y; by default 0 and those of the lines, in y rounded to ticks.
+    ends: smallest and largest x and y; by default those of 0 and the lines, in y rounded to ticks.
     is_scaled: draw ticks on the y axis.
     Returns the shapes, and a function from data to pixels; values beyond the y axis are clamped to its ends.
     """
@@ -293,7 +297,7 @@ def chart(
 def stacked(
     area: Box, gap: float, along: str, kinds: Mapping[str, Sequence[ChartLine]]
 ) -> tuple[list[SvgElement], Place]:
-    """Draw charts one below the other over one x axis, whose title is below the last, as `chart` does.
+    """Draw charts with `chart`, one below the other, over one x axis, whose title is below the last.
 
     area: of the first chart, whose function from data to pixels is returned.  along: title of the x axis.
     kinds: title of the y axis -> lines
@@ -320,10 +324,7 @@ ANCHORS = {"start": "left", "middle": "center", "end": "right"}
 
 
 def require_matplotlib() -> None:
-    """Check that matplotlib is installed.
-
-    Raises FileProblem.
-    """
+    """Raise FileProblem if matplotlib is not installed."""
     from importlib.util import find_spec
 
     if find_spec("matplotlib") is None:
@@ -382,18 +383,18 @@ def write_png(picture: Picture) -> bytes:
     return stream.getvalue()
 
 
-# --- overlays: projected points on the camera's image, coloured by depth; pixels, the centre of the first one at 0, 0
+# --- overlays: projected points on the camera's image, coloured by depth; the centre of the first pixel is 0, 0
 
 SUFFIXES = (".svg", ".html", ".png")
 MOST, FEW = 20_000, 1000  # largest number of points drawn, and of points drawn large
-CORNER = (-0.5, -0.5)  # of an image, whose first pixel has its centre at 0, 0
+CORNER = (-0.5, -0.5)  # upper left corner of an image whose first pixel has its centre at 0, 0
 SHADES = 24  # colours of the scale
 PNG, JPEG = b"\x89PNG\r\n\x1a\n", b"\xff\xd8"
 FRAMES = {*range(0xC0, 0xD0)} - {0xC4, 0xC8, 0xCC}  # the markers of JPEG that are followed by a size
 
 
 class Overlay:
-    """The points in an image; beyond MOST, every second, fourth .. is drawn."""
+    """Projected points on an image; if there are more than MOST, only every second, fourth .. is drawn."""
 
     def __init__(self, image: str, path: str) -> None:
         """Read a PNG or a JPEG, to be embedded unchanged.
@@ -428,7 +429,7 @@ class Overlay:
         self.count, self.every = 0, 1
 
     def take(self, u: Number, v: Number, depth: Number, inside: Any) -> None:
-        """Add the points of a block, or one point, that are in the image."""
+        """Add the points of a block, or one point, where `inside` is True."""
         if isinstance(inside, bool):
             found = [(depth, u, v)] * inside
         else:
@@ -439,7 +440,7 @@ class Overlay:
             self.points, self.every = self.points[::2], 2 * self.every
 
     def drawn(self) -> str | bytes:
-        """Return the overlay in the format of its suffix, with far points below near ones."""
+        """Return the overlay in the format of its suffix; near points cover far ones."""
         self.points.sort(reverse=True)
         near, far = (self.points[-1][0], self.points[0][0]) if self.points else (0.0, 0.0)
         wide, high = self.size

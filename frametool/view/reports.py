@@ -32,7 +32,7 @@ BELOW = str.maketrans("├└─", "│  ")  # the lines of a drawing -> those i
 def columns(rows: Sequence[Sequence[str]], left: Sequence[bool]) -> str:
     """Return rows as lines of aligned cells, within WIDTH or the terminal's if possible; empty columns are omitted.
 
-    left: which columns are aligned to the left; if the last one is, it has remarks of any length.
+    left: True for columns aligned to the left; if the last one is, it has remarks of any length
     A first cell or a remark that does not fit has a line of its own.
     """
     width = max(WIDTH, get_terminal_size((WIDTH, 0)).columns)
@@ -68,7 +68,7 @@ def folded(text: str, indent: str = "") -> Iterator[str]:
 
 
 def short(name: str, width: int) -> str:
-    """Shorten a name to some columns, preserving both ends."""
+    """Shorten a name to `width` columns, preserving both ends."""
     name = printable(name)
     if cells(name) <= width:
         return name
@@ -77,7 +77,7 @@ def short(name: str, width: int) -> str:
 
 
 def fixed(value: float | None, decimals: int) -> str:
-    """Return a number with some decimals, or an exponent if it is too small or too large for them; 0 instead of -0."""
+    """Format a number with some decimals, or an exponent if it is too small or large for them; 0 instead of -0."""
     if value is None:
         return "-"
     is_plain = abs(value) < NOTHING or 0.5 * 10.0**-decimals <= abs(value) < LARGE
@@ -91,7 +91,7 @@ TREE_MARKS = (r"(?m)^(?P<green>[^│├└ \n].*)", r"(?m)^(?P<dim>[│├└─
 def write_tree(tree: Frames, style: Style) -> str:
     """Draw a tree: each frame below its parent, with its newest pose there, its sigmas, and its motion.
 
-    Children are in the order they were added; a stack avoids Python's recursion limit.
+    Children are in the order in which they were added; a stack avoids Python's recursion limit.
     """
     children: dict[str, list[Track]] = {}
     for each in tree.tracks():
@@ -126,7 +126,7 @@ HIDDEN = (  # keys without a column in the table of edges; sentences show some o
 
 
 def write_report(entries: Sequence[dict[str, Any]]) -> str:
-    """Return a table of the edges without empty columns, then sentences on moving edges and on the chain."""
+    """Return a table of the edges without empty columns, then sentences about moving edges and the chain."""
     edges = [entry for entry in entries if entry["kind"] != "chain"]
     keys = [key for key in entries[0] if key not in HIDDEN]
     shown = [key for key in keys if any(entry[key] or (entry[key] == 0 and key != "parent_changes") for entry in edges)]
@@ -163,7 +163,7 @@ def _edge(entry: dict[str, Any]) -> str:
 
 
 def _cell(key: str, entry: dict[str, Any]) -> str:
-    """Return the text of a value, whose key ends with its unit."""
+    """Format a value by the unit at the end of its key."""
     if key == "parent":
         return _edge(entry)
     value = entry[key]
@@ -175,7 +175,7 @@ def _cell(key: str, entry: dict[str, Any]) -> str:
 
 
 def write_diff(found: Iterable[Difference]) -> str:
-    """Return sentences on all differences except motion, and tables of the frames that moved."""
+    """Return a sentence for each difference except motion, and tables of the frames that moved."""
     every = [*found]
     moved = [each for each in every if each.kind in ("moved", SAME)]
     parts = ["".join(f"{line}\n" for each in every if each not in moved for line in folded(each.sentence))]
@@ -210,7 +210,7 @@ def write_formats(entries: Sequence[dict[str, Any]]) -> str:
 
 
 def write_format(entry: dict[str, Any]) -> str:
-    """Describe one format, also how it is detected, of regular expressions only the kind, and with an example."""
+    """Describe one format, with its signs (only the kind of a regular expression) and an example."""
     shown_as = re.compile(r"[\w./*|-]+").fullmatch
     magic = FORMATS[entry["name"]].magic
     signs = [f"{kind} {what}" if isinstance(what, str) and shown_as(what) else kind for kind, what in magic]
@@ -219,7 +219,7 @@ def write_format(entry: dict[str, Any]) -> str:
 
 
 def _described(entry: dict[str, Any], more: str = "") -> str:
-    """Return wrapped lines on a format, the first one after its name."""
+    """Return the name of a format, followed by wrapped lines that describe it."""
     suffixes = f" ({' '.join(entry['suffixes'])})" if entry["suffixes"] else ""
     uses = (("read as", entry["reads"]), ("written from", entry["writes"]))
     texts = [f"{entry['summary']}{suffixes}", "; ".join(f"{use} {', '.join(what)}" for use, what in uses if what)]
@@ -233,7 +233,7 @@ class Solution(NamedTuple):
     """The result of `solve`.
 
     numbers: the report on the fit, its frames and its measurements; `shape` is tree, hand-eye or points
-    poses: of the frames in their parents; roots too.  left_out: the rejected measurements
+    poses: of the frames in their parents; a root has no parent.  left_out: the rejected measurements
     fixed: the frames of --fix.  turns: rms rotation about the two main axes, radians
     """
 
@@ -245,7 +245,7 @@ class Solution(NamedTuple):
 
 
 def sigma_entry(pose: Pose) -> dict[str, list[float]] | None:
-    """Return the sigmas of a pose for a report: metres and degrees, along and about each axis."""
+    """Return the sigmas of a pose for a report, metres and degrees along and about each axis; None if unknown."""
     if pose.covariance is None:
         return None
     roots = sigmas_of(pose.covariance)

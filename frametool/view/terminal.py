@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     Spot = tuple[int, int]  # line and column
 
 
-DOTS = ((0x01, 0x08), (0x02, 0x10), (0x04, 0x20), (0x40, 0x80))  # by row, then column of a cell
+DOTS = ((0x01, 0x08), (0x02, 0x10), (0x04, 0x20), (0x40, 0x80))  # bits of a cell's dots, by row and column
 
 
 class Canvas:
@@ -48,7 +48,7 @@ class Canvas:
             self.cells[cell] = dots | DOTS[down % 4][across % 2], colour
 
     def runs(self, line: int, over: Mapping[Spot, Run]) -> list[Run]:
-        """Return a line as runs of one colour; over: letters that replace cells, and their style."""
+        """Return a line as runs of one style; over: letters that replace cells, with their style."""
         drawn = []
         for column in range(self.columns):
             dots, colour = self.cells.get((line, column), (0, ""))
@@ -111,7 +111,7 @@ def print_terminal(scene: FrameScene, eye: Eye = EYES["slanted"], color: str = "
 
 
 def _mark_line(canvas: Canvas, flat: Projection, begin: Flat, end: Flat, colour: str, gap: int = 1) -> None:
-    """Draw a line, with `gap` only every second, third, .. dot; a line that leaves the picture is cut."""
+    """Draw a line, with `gap` only every second, third, .. dot; the part outside of the picture is not drawn."""
     if not flat.holds(begin):
         begin, end = end, begin
     if not flat.holds(begin):
@@ -126,7 +126,7 @@ def _mark_line(canvas: Canvas, flat: Projection, begin: Flat, end: Flat, colour:
 
 
 def _at_edge(flat: Projection, name: str) -> Iterator[Label]:
-    """Yield labels at the edge for a frame outside the picture, with distance and arrow, best position first."""
+    """Yield labels at the edge, with distance and arrow, for a frame outside the picture; best position first."""
     x, y, _ = flat.origins[name]
     half_wide, half_high = flat.size.width / 2.0, flat.size.height / 2.0
     across, down = x - half_wide, y - half_high
@@ -143,12 +143,12 @@ def _at_edge(flat: Projection, name: str) -> Iterator[Label]:
         yield from flat.label(text, length, flat.origins[name], left, middle)
 
 
-# one colour per turtle, also if their pens have one colour, in the order of their names: on the picture -> on white
+# colours of turtles, whatever their pens have: on the picture -> on white
 ON_WHITE = {
     "#f4d35e": "#c79a00", "#ee964b": "#d4691b", "#7bdff2": "#1593ad", "#b2f7ef": "#2a9d8f",
     "#f7a1c4": "#d6458b", "#c3f584": "#5a9a16", "#d0bdf4": "#7d5fc7", "#ffffff": "#666666",
 }  # fmt: skip
-BACKGROUND = (69, 86, 255)  # turtlesim's
+BACKGROUND = (69, 86, 255)  # that of turtlesim
 LOGGED = 3  # lines of messages below the turtles
 
 
@@ -161,7 +161,7 @@ class Screen:
     """Draws the steps of a run as they arrive; the context manager `live` takes over and restores the terminal."""
 
     def __init__(self, scene: Scene, *, to_stderr: bool = False, console: Console | None = None) -> None:
-        """Choose the terminal of stdout or stderr; the picture fits it."""
+        """Choose the terminal of stdout or stderr, and the size of the picture."""
         from rich.live import Live
 
         from frametool.sim.simulate import SimulationStep
@@ -197,13 +197,13 @@ class Screen:
             self._drawn = monotonic()
 
     def _dot(self, state: TurtleState) -> tuple[int, int]:
-        """Return column and row of the dot of a turtle, inside the canvas also at the walls."""
+        """Return column and row of a turtle's dot, clamped to the canvas."""
         dots = 4 * self._canvas.lines
         across, down = (min(int(part * dots / SIZE), dots - 1) for part in (state.x, SIZE - state.y))
         return across, down
 
     def _picture(self) -> Panel:
-        """Return the picture with its messages."""
+        """Return the picture with the last messages below."""
         from rich.panel import Panel
         from rich.text import Text
 

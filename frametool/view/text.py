@@ -47,7 +47,7 @@ def write_poses(results: Iterable[Result], style: Style) -> str:
 
 
 def write_points(records: Iterable[dict[str, Any]], style: Style) -> str:
-    """Return one aligned line per point or vector, with its frame."""
+    """Return one aligned line per point or vector, with its frame; for a single point in ecef also its place."""
     frames, rows = [], []
     for record in records:
         frame = f"m in {record['frame']}" if record.get("frame") else "m"
@@ -100,7 +100,7 @@ def _describe(result: Result, style: Style) -> str:
             lines.append(("sigma", [], " ".join(each.replace(" ", GLUE) for each in sigmas)))
         elif key not in TIMES and value is not None:
             lines.append((key, [], _extra_text(value)))
-    if style.place is not None and style.place.origin is not None:  # in the axes at the origin, not in ecef
+    if style.place is not None and style.place.origin is not None:  # the pose is in the axes at the origin, not in ecef
         result = Result(result.pose._replace(parent=f"{style.place.name} at the origin"), result.extras)
     return _heading(result) + (_layout(lines, style) if lines else "  identity\n")
 
@@ -141,7 +141,7 @@ def in_width(text: str, more: str, *, gap: str = " ") -> str:
 
 
 def _earth_lines(pose: Pose) -> Iterator[Line]:
-    """Yield lines with the geodetic position and heading of a pose or point in ecef; none if it is not finite."""
+    """Yield lines with the geodetic position and heading of a pose or point in ecef, if it is finite."""
     from frametool.grammar.place import overview
 
     yield from ((label, [], text) for label, text in overview(pose))
@@ -156,13 +156,13 @@ def _sigmas(key: str, value: Any) -> list[str]:
     except (TypeError, ValueError):
         return []
     if numbers[0] == -1.0:
-        return ["unknown"]  # as ROS has it
+        return ["unknown"]  # ROS marks an unknown covariance by -1
     roots = sigmas_of(numbers)
     return [*map(_length, roots[:3]), *(_two_digits(math.degrees(root), "deg") for root in roots[3:])]
 
 
 def sigmas_of(covariance: Sequence[float]) -> list[float]:
-    """Return the standard deviations of a covariance, those of a pose or of a point."""
+    """Return the standard deviations of a covariance of 6x6 or 3x3 numbers."""
     return [math.sqrt(max(entry, 0.0)) for entry in covariance[:: math.isqrt(len(covariance)) + 1]]
 
 
@@ -177,7 +177,7 @@ def _length(metres: float) -> str:
 
 
 def _two_digits(value: float, unit: str) -> str:
-    """Return a sigma with its unit: `2.1 mm`, `12 m`; tiny and huge ones have an exponent."""
+    """Format a sigma with its unit: `2.1 mm`, `12 m`; tiny and huge ones have an exponent."""
     value = value if value > ROUNDED_TO_ZERO else 0.0
     if value and not 0.001 <= value < EXPONENT_FROM:
         return f"{value:.1e} {unit}"
@@ -191,7 +191,7 @@ def _extra_text(value: Any) -> str:
 
 
 def _layout(lines: Sequence[Line], style: Style, label: int = 0) -> str:
-    """Align names and numbers in columns; if that is too wide, each part by itself; wrap lines that are still too wide.
+    """Align names and numbers in columns: of all lines or, if that is too wide, of each part; wrap longer lines.
 
     label: minimum width of the labels
     """
@@ -218,7 +218,7 @@ def _layout(lines: Sequence[Line], style: Style, label: int = 0) -> str:
 
 
 def _number(value: float, style: Style) -> str:
-    """Return a number for people: DECIMALS in an overview, else all digits; 0 instead of -0."""
+    """Format a number for people: DECIMALS in an overview, else all digits; 0 instead of -0."""
     text = style.number(value + 0.0)
     if style.precision is None and not style.full and len(style.notations) != 1:
         text = f"{value:.{DECIMALS}f}" if abs(value) < EXPONENT_FROM else f"{value:.{DECIMALS}e}"
@@ -266,9 +266,9 @@ PATIENCE, BETWEEN = 2.0, 0.1  # seconds before the bar is shown, and between upd
 def progress_bar(
     total: int | None, *, quiet: bool = False, counted: str = "rows"
 ) -> Iterator[Callable[[int, int], None]]:
-    """Yield a function that counts rows and bytes; on a terminal they are shown if the job takes longer than PATIENCE.
+    """Yield a function that adds rows and bytes; on a terminal they are shown if the job takes longer than PATIENCE.
 
-    total: bytes, if known; counted: the unit of the count
+    total: number of bytes, None if unknown; counted: the unit of the rows
     """
     is_hidden, begin = quiet or sys.stderr is None or not sys.stderr.isatty(), time.monotonic()
     rows, size, due = 0, 0, PATIENCE
@@ -284,7 +284,7 @@ def progress_bar(
             if bar is None:
                 from rich.progress import Progress, TextColumn
 
-                columns = [] if total else [TextColumn("{task.description}")]  # by default with a bar
+                columns = [] if total else [TextColumn("{task.description}")]  # [] is rich's default, with a bar
                 bar = Progress(*columns, console=coloured_console(stderr=True), transient=True)
                 bar.start()
                 bar.add_task("", total=total)
