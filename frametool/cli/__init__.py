@@ -10,7 +10,7 @@ import sys
 from io import TextIOWrapper
 
 IN_OUT, INTERRUPTED = 5, 130  # exit codes
-COLLECTED_EVERY = (100_000, 20, 100)  # objects, and collections: scanning a large tree again and again is slow
+COLLECTED_EVERY = (100_000, 20, 100)  # thresholds of the garbage collector: scanning a large tree repeatedly is slow
 
 
 def main(arguments: list[str] | None = None) -> None:
@@ -23,7 +23,7 @@ def main(arguments: list[str] | None = None) -> None:
         status = with_signals(run, sys.argv[1:] if arguments is None else arguments)
     except KeyboardInterrupt:
         status = INTERRUPTED
-    except (ImportError, OSError) as error:  # no module can be opened, nor those that write messages
+    except (ImportError, OSError) as error:  # modules cannot be opened, not even those that write messages
         sys.stderr.write(f"frametool: {(getattr(error, 'strerror', None) or str(error)).lower()}\n")
         status = IN_OUT
     gc.freeze()  # no garbage collection at exit
@@ -61,7 +61,7 @@ def run(arguments: list[str]) -> int:
     except BrokenPipeError:
         status = end_by_signal("SIGPIPE")  # as `cat` does if its reader is gone
     except SYSTEM_ERRORS as error:
-        if status != in_out or not isinstance(error, OSError):  # else it is reported, and the buffer fails again
+        if status != in_out or not isinstance(error, OSError):  # else it was reported, and flushing failed again
             say(system_message(error))
         if isinstance(error, OSError):
             discard(sys.stdout)

@@ -31,19 +31,18 @@ if TYPE_CHECKING:
 # an argument that begins like this is a number, not a short option
 NEGATIVE = r"(?i)-(\d|\.\d|inf(inity)?$|nan$|pi\b|[jk]$|[ijk] ?[-+].| +(Translation:|Rotation:|Pose \[)|--\s)"
 EXIT_CODES = "Exit codes: 0 done, 1 bad data, 2 usage, 3 rows skipped, 4 lookup, 5 file."
-EVERYTHING = "frametool.everything"  # a key of a context's `meta`
-INPUTS = "frametool.inputs"  # another
+EVERYTHING = "frametool.everything"  # key of a context's `meta`: True for --help-all
+INPUTS = "frametool.inputs"  # key of a context's `meta`: the Inputs of the command
 # values of repeatable options in commands that do not have them
 WITHOUT = {"input_formats": (), "topics": (), "joints": (), "joint_files": (), "named_frames": (), "messages": ()}
-# options on messages, which may be without effect
 
 
 class Inputs:
     """The arguments and options of a command, by the names of its parameters; reading one marks it as used.
 
-    unused: the options that were passed and are not used yet
-    peek: returns a value without marking it as used
-    reads_trees: files of frames are opened, so --in applies to these too
+    unused: name -> option, of the options that were passed and are not used yet
+    peek: function that returns a value without marking it as used
+    reads_trees: True once files of frames are opened, to which --in applies too
     earth: the options on geodetic positions, set when first needed
     """
 
@@ -68,11 +67,11 @@ class Inputs:
             self.unused.pop(name, None)
 
     def update(self, **values: Any) -> None:
-        """Replace values by the part of them that is left for other readers."""
+        """Replace values, such as topics by those that are left for other readers."""
         self._values |= values
 
     def changed(self, **values: Any) -> Inputs:
-        """Return these inputs with other values."""
+        """Return these inputs with other values for some parameters."""
         return Inputs(self._values | values, self.unused)
 
     def note(self, *texts: str | None) -> None:
@@ -95,7 +94,7 @@ class Option(click.Option):
     """
 
     def __init__(self, names: Any, excludes: Any = (), requires: Any = (), under: str = "Options", **rest: Any) -> None:
-        """Store these; the rest is click's."""
+        """Store the relations and the heading; rest: arguments of click.Option."""
         super().__init__(names, **rest)
         self.excludes, self.requires, self.under = excludes, requires, under
 
@@ -119,7 +118,7 @@ def say_if_typed(argument: str = "-") -> None:
 
 @contextmanager
 def misuse(where: str = "") -> Iterator[None]:
-    """Turn ValueInvalid into a usage error that begins with `where`; NotARotation is passed on."""
+    """Convert ValueInvalid into a usage error that begins with `where`; NotARotation is raised unchanged."""
     try:
         yield
     except ValueInvalid as error:
@@ -131,7 +130,10 @@ def misuse(where: str = "") -> Iterator[None]:
 
 
 def marking_use(inputs: Inputs, kind: type[Record], options: Mapping[str, Sequence[str]]) -> type[Record]:
-    """Return a subclass of a record type; reading a field that is not empty marks its options as used."""
+    """Return a subclass of a record type that marks options as used when a field that is not empty is read.
+
+    options: field -> the names of its options
+    """
 
     def look_at(record: Record, name: str) -> Any:
         value = kind.__getattribute__(record, name)
@@ -155,7 +157,7 @@ def _help(ctx: click.Context, option: click.Parameter, chosen: bool) -> None:  #
 
 
 def option_row(option: click.Option) -> tuple[str, str]:
-    """Return the names of an option with its value, and its meaning; long lists of choices are part of the meaning."""
+    """Return the names of an option with its value, and its meaning; a long list of choices is part of the meaning."""
     names, text = ", ".join((*option.opts, *option.secondary_opts)), option.help or ""
     taken = option.metavar or option.type.name.upper()
     if isinstance(option.type, click.Choice) and not option.metavar:
@@ -200,7 +202,7 @@ def grouped(options: Iterable[click.Parameter], own: Sequence[str] = ()) -> dict
 
 
 def option_groups(command: click.Command, ctx: click.Context) -> dict[str, list[click.Option]]:
-    """Return the options of a command by heading, its main ones under the first."""
+    """Return the options of a command by heading; its own main options are under the first."""
     return grouped(command.get_params(ctx), getattr(command, "own", ()))
 
 
@@ -215,7 +217,7 @@ def write_options(formatter: click.HelpFormatter, groups: Mapping[str, Sequence[
 
 
 def _is_negative(argument: str) -> bool:
-    """Return True if an argument is a negative number; the pattern is only compiled if it may match, which is slow."""
+    """Return True if an argument is a negative number; the pattern, slow to compile, is used only if it may match."""
     is_long = argument[:2] == "--" and argument[2:3].isalpha()
     return argument[:1] == "-" and not is_long and re.match(NEGATIVE, argument) is not None
 
@@ -234,7 +236,7 @@ class Text(click.types.StringParamType):
         self, read: Callable[[str], Any] = str, offers: Offers = lambda _ctx, _incomplete: {},
         choices: Collection[str] = (),
     ) -> None:  # fmt: skip
-        """Store these."""
+        """Store the functions and the choices."""
         self.read, self.offers, self.choices = read, offers, choices
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
@@ -270,7 +272,7 @@ OF_POSES = ("compose", "convert", "interpolate", "invert", "mean", "relative")  
 
 
 def _kind(kind: Any, offers: Offers = TEXT.offers) -> click.ParamType[Any]:
-    """Return the parameter type of a tuple of choices, or of a function that parses the text; offers: as for Text."""
+    """Return the parameter type for a tuple of choices or a function that parses the text; offers: as for Text."""
     if isinstance(kind, click.ParamType):
         return kind
     if isinstance(kind, tuple):
@@ -279,8 +281,9 @@ def _kind(kind: Any, offers: Offers = TEXT.offers) -> click.ParamType[Any]:
 
 
 def option(spec: str, about: str, kind: Any = None, name: str = "", **more: Any) -> Adds:
-    """Return an option from its names and value as in its help, `-o --output FILE`; a flag without value and kind.
+    """Return a decorator that adds an option.
 
+    spec: its names and value as in its help, `-o --output FILE`; without a value and a kind it is a flag
     kind: the choices, or a function that parses the value; by default a text or a file
     name: of the parameter, if it differs from that of the option
     """
@@ -304,19 +307,19 @@ def option(spec: str, about: str, kind: Any = None, name: str = "", **more: Any)
 
 
 def argument(name: str, kind: Any = TEXT, metavar: str | None = None, **more: Any) -> Adds:
-    """Return an argument; optional with a default, `required=False` or any number of values."""
+    """Return a decorator that adds an argument; optional with a default, `required=False` or any number of values."""
     return click.argument(name, type=_kind(kind), metavar=metavar, **more)
 
 
 def together(*options: Adds) -> Adds:
-    """Return a decorator that adds several options to a command, in this order in its help."""
+    """Return a decorator that adds several options, in this order in the help."""
     return lambda function: reduce(lambda made, add: add(made), reversed(options), function)
 
 
 class WithHelp(click.Command):
-    """A command with one -h and --help, and --help-all.
+    """A command with -h and --help, and --help-all.
 
-    own: its main options, which other commands have under another heading
+    own: names of its main options, which other commands have under another heading
     lists: writes a list before the exit codes, for --help-all with explanations
     """
 
@@ -364,7 +367,7 @@ class Command(WithHelp):
         return self.parser
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
-        """Protect negative numbers (not -j if it is an option), add default values of options, then parse."""
+        """Protect negative numbers (but not -j if that is an option), add default values of options, then parse."""
         if any(map(_is_negative, args)):
             options = {name for each in self.get_params(ctx) for name in each.opts}
             args = [f" {each}" if _is_negative(each) and each not in options else each for each in args]
@@ -394,7 +397,7 @@ class Command(WithHelp):
         return rest
 
     def invoke(self, ctx: click.Context) -> Any:
-        """Run the command; all options that were passed must be used before something is written."""
+        """Run the command; raises a usage error for options without effect before anything is written."""
         passed: Inputs = ctx.meta[INPUTS]
         CHECKS.append(passed.refuse_unused)
         try:
@@ -410,7 +413,7 @@ class Command(WithHelp):
         return result
 
     def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        """End the help with the exit codes: those of the epilog, or the common ones."""
+        """Write the exit codes at the end of the help: those of the epilog, or the common ones."""
         formatter.write_paragraph()
         if self.lists:
             self.lists(formatter, bool(ctx.meta.get(EVERYTHING)))
@@ -419,7 +422,7 @@ class Command(WithHelp):
 
 
 def _join_inverses(args: list[str], ctx: click.Context, *, always: bool) -> list[str]:
-    """Rewrite the word `inv` and the pose behind it as inv(POSE); `always`: also if that may not be a pose."""
+    """Rewrite the word `inv` and the pose after it as inv(POSE); always: also if the next word may not be a pose."""
     joined: list[str] = []
     for each in reversed(args):
         is_pose = bool(joined) and (always or joined[-1].lstrip(" ~").startswith(("{", "[", "inv(", "p[")))

@@ -1,4 +1,4 @@
-"""Define what commands share: types of arguments, options of inputs, results and times; defining them reads no file.
+"""Common types of arguments, and options of inputs, results and times; importing this module reads no file.
 
 Times are decimal seconds or nanoseconds, `latest`, ranges and files; they never pass through a float.
 """
@@ -31,13 +31,16 @@ READ = readers("tree", "records", "rows", "arrays", "joints", "drawing")
 
 
 def utf8(text: str) -> str:
-    """Return text that becomes part of a result; raises ValueInvalid for bytes that are not UTF-8."""
+    """Return text that becomes part of a result unchanged; raises ValueInvalid for bytes that are not UTF-8."""
     encoded(text)
     return text
 
 
 def read_names(text: str, spec: str = "") -> tuple[str, ...]:
-    """Parse names separated by commas; spec: an example like REF,EST with the required number of different names."""
+    """Parse names separated by commas.
+
+    spec: an example like REF,EST with the required number of different names
+    """
     names = tuple(name.strip() for name in text.split(",")) if text else ()
     if not all(names):
         raise ValueInvalid(f"{shown(text)} is not names with commas between them")
@@ -51,7 +54,7 @@ OF_EARTH = ("origin", "local_axes", "zone")  # options on geodetic positions
 
 
 def _with_axes(chosen: Notation) -> Notation:
-    """Return a representation; raises ValueInvalid for euler without axes, before anything is read."""
+    """Return a representation unchanged; raises ValueInvalid for euler without axes, before anything is read."""
     chosen.bound_axes()
     return chosen
 
@@ -62,7 +65,7 @@ def _read_notations(text: str) -> tuple[Notation, ...]:
 
 
 def _offer_notations(_ctx: click.Context, incomplete: str) -> Mapping[str, str]:
-    """Offer names behind the last comma, and the axes behind a colon."""
+    """Offer names after the last comma, and the axes after a colon."""
     done, comma, begun = incomplete.rpartition(",")
     names = [*REPRESENTATIONS, *(f"{name}_deg" for name, row in REPRESENTATIONS.items() if row.angles)]
     spec = begun.partition(":")[0]
@@ -102,14 +105,14 @@ def suffix_of(path: str) -> str:
 
 
 def read_path(path: str, suffixes: Collection[str]) -> str:
-    """Return the name of a file; raises ValueInvalid unless it ends in one of the suffixes."""
+    """Return a file name unchanged; raises ValueInvalid unless it ends in one of the suffixes."""
     if suffix_of(path) not in suffixes:
         raise ValueInvalid(f"{shown(path)} does not end in {' or '.join(suffixes)}")
     return path
 
 
 def _offer_axes(_ctx: click.Context, incomplete: str) -> Mapping[str, str]:
-    """Offer the axis conventions, and those behind `_from_`."""
+    """Offer the axis conventions, also after `_from_`."""
     from frametool.geometry.conventions import AXES, MIRRORED, SYSTEMS
 
     begun, joint, _ = incomplete.partition("_from_")
@@ -148,7 +151,7 @@ def tree_on_the_line(ctx: click.Context) -> str | None:
 
 
 def _offer_joints(ctx: click.Context, incomplete: str) -> Mapping[str, str]:
-    """Offer the joints of the robot and their limits; behind the = the limits."""
+    """Offer the joints of the robot with their limits; after the = the limits."""
     from frametool.formats.load import load
 
     robots = load(tree_on_the_line(ctx) or "").robots
@@ -178,7 +181,7 @@ _EDGES = _of_formats("--edges", "read the edges of a g2o graph instead of its ve
 _TOPIC = _of_files("--topic NAME", "read only this topic; may be repeated", name="topics", multiple=True)
 # for streams of poses: the topic of a bag, timestamps, axes of cameras
 pose_reading_options = together(_TOPIC, _CAMERA_AXES, _STAMPS, _EDGES)
-# how files of frames are read, for `trees.opened`
+# options on how files of frames are read, used by `trees.opened`
 reading_options = together(
     in_option,
     _TOPIC,
@@ -198,7 +201,7 @@ reading_options = together(
 
 
 def take_stream_format(formats: list[str]) -> str:
-    """Remove the format of the stream from those of --in and return it: the last that can be streamed, "" if none."""
+    """Remove the stream's format, the last one that can be streamed, from those of --in; return it, or ""."""
     for at in reversed(range(len(formats))):
         if not {*STREAMED}.isdisjoint(FORMATS[formats[at]].reads):
             return formats.pop(at)
@@ -206,7 +209,7 @@ def take_stream_format(formats: list[str]) -> str:
 
 
 def for_each(formats: Sequence[str], files: int) -> list[str]:
-    """Return the format of each file by --in; the last one is repeated, "" without any."""
+    """Return the format of each file by --in; the last one is repeated; "" without --in."""
     refuse(len(formats) > files, f"--in appears {len(formats)} times for {files} file{'s' * (files != 1)}")
     return [*formats, *([*formats[-1:]] or [""]) * (files - len(formats))]
 
@@ -236,14 +239,14 @@ _RECORDING = together(
                 parse_messages, default=()),
     _of_results("--topic-out NAME", "topic of the messages of a recording"),
 )  # fmt: skip
-# of commands without --frames for their input
+# for commands whose --frames is not about the input
 _FRAMES_OUT = "names of the frames of poses in a recording; adds /tf"
 frames_out_option = _of_results("--frames WORLD,BODY", _FRAMES_OUT, partial(read_names, spec="WORLD,BODY"),
                                 name="recorded_frames")  # fmt: skip
 
 
 def result_options(*what: str) -> Adds:
-    """Return the options of a command on its result; the kinds of results in `what` decide the formats."""
+    """Return the options on the result of a command; the kinds of results in `what` determine the formats."""
     formats = writers(*what)
     recording = [_RECORDING] * (not set(formats).isdisjoint(writers("recording")))
     kind = format_among(("text", *formats), "written here")
@@ -252,7 +255,7 @@ def result_options(*what: str) -> Adds:
 
 
 def list_options(*more: str) -> Adds:
-    """Return the options of a command on its result, a list for people whose default is text.
+    """Return the options on the result of a command that prints a list; the default format is text.
 
     more: formats other than text and those of reports
     """
@@ -275,7 +278,7 @@ scale_option = option("--scale", "read a matrix s R as a similarity with scale s
 
 
 def pose_result_options(*what: str) -> Adds:
-    """Return the options of a command on reading poses and on its result."""
+    """Return the options on reading poses and on the result of a command."""
     return together(rotation_options, pose_options, result_options(*what))
 
 
@@ -291,7 +294,7 @@ def read_limit(text: str) -> int:
 
 
 def read_span(text: str) -> int:
-    """Parse a duration, not negative, to nanoseconds."""
+    """Parse a duration to nanoseconds; raises ValueInvalid for a negative one."""
     found = read_limit(text)
     if found < 0:
         raise ValueInvalid(f"a time here is not less than 0, found {shown(text)}")
@@ -316,7 +319,7 @@ def read_time(text: str) -> Any:
 
 
 def parser(module: str, name: str) -> Callable[[str], Any]:
-    """Return what parses an option by a function of a module, which is imported when there is a text."""
+    """Return a parser that calls a function of a module, which is imported at the first call."""
     return lambda text: getattr(import_module(module), name)(text)  # noqa: PLW0108 - later
 
 
@@ -327,7 +330,7 @@ def _offset(text: str) -> Any:
     return FromFirst() if text == "first" else read_limit(text)
 
 
-# of a tree: more files, and the meaning of moving frames
+# options of a tree: more files, and the meaning of moving frames
 rules_options = together(
     _of_files("--with FILE", "merge this tree too; may be repeated", name="more", multiple=True),
     _of_times("--moving", "an edge with one timestamp is valid only at that time"),
@@ -342,7 +345,7 @@ limit_options = together(
     _of_times("--stop TIME", "ignore everything after", read_limit),
     offset_option,
 )
-# for commands that read files of frames; for one tree whose frames may move
+# for commands that read several files of frames, and for commands that read one tree, which may move
 file_options = together(reading_options, verbose_option, pose_options)
 moving_options = together(rules_options, offset_option, reading_options, verbose_option)
 
@@ -380,7 +383,7 @@ def read_times(text: str, report: Callable[[FormatError], None]) -> Sequence[int
 
 # --- misuse --------------------------------------------------------------------------------------------------------
 
-# an option, also behind its command or with a value, or a subcommand -> what to use instead
+# removed option (also after its command, or with a value) or subcommand -> what to use instead
 REPLACED = {
     "--jobs": "split the input, `split -n l/8 ROWS part. && ls part.* | xargs -P 8 -I{} frametool .. -i {} -o {}.out`",
     "sim sweep": 'a loop in Python over `frametool.simulate(..)` of `FollowController("ros1", gain_linear=2)`',
@@ -396,7 +399,7 @@ REPLACED = {
 
 
 def replacement(arguments: Sequence[str]) -> str | None:
-    """Return the message on the first removed option or subcommand of a command line, None without one."""
+    """Return the message about the first removed option or subcommand on a command line, None without one."""
     for word in arguments:
         option = word.partition("=")[0]
         for name in (option, word, f"{arguments[0]} {option}"):

@@ -87,7 +87,7 @@ class Output:
     def __init__(self, inputs: Inputs, *what: str, otherwise: str | None = None) -> None:
         """Choose the format: that of --format, else by the file's suffix, else text for a terminal and YAML for a pipe.
 
-        what: kinds of results, which decide the formats that a suffix may name
+        what: kinds of results, which determine the formats that a suffix may name
         otherwise: the default format, instead of text and YAML
         """
         self._inputs = inputs
@@ -114,7 +114,7 @@ class Output:
         self.holds_all = self._in_blocks or fmt == "csv"  # formats for many rows
         if "arrays" in row.writes and self.path is None and sys.stdout.isatty():
             raise ValueInvalid(f"{fmt} is no text for a terminal; give -o FILE, or pipe it")
-        usual = () if fmt in ("text", "dot", "mermaid") else QUATERNION  # drawings have defaults of their own
+        usual = () if fmt in ("text", "dot", "mermaid") else QUATERNION  # text and drawings have other defaults
         digits = inputs.peek("precision")
         self.style = Style(
             fmt, notations or usual, degrees=bool(inputs.deg), precision=None if digits == FULL else digits,
@@ -130,7 +130,7 @@ class Output:
             self.style = self.style._replace(recording=recording)
 
     def set_camera_axes(self, known: str, operation: Operation | None = None) -> None:
-        """Set the axes of the camera whose poses are written: those of --camera-axes, else of the input format."""
+        """Set the axes of the camera whose poses are written: by --camera-axes, else `known`, those of the input."""
         stated = self._inputs.peek("camera_axes") or ""
         axes = (stated or known) if operation is None or operation.keeps_child else ""
         self.style = self.style._replace(axes=axes, in_camera=operation is not None and operation.looks_back)
@@ -144,7 +144,7 @@ class Output:
             self.set_camera_axes(tree.camera_axes.get(source, ""))
 
     def values(self, values: Iterable[Value]) -> None:
-        """Write results: poses as poses; points, vectors and messages, which are mappings, unchanged."""
+        """Write results: poses in the chosen representations, other records, which are mappings, unchanged."""
         if not self._in_blocks:
             self.text(self.text_of([*values]))
             return
@@ -154,7 +154,7 @@ class Output:
         self.pieces(filter(None, chain(map(writer.of_block, blocks_of(values)), writer.end())))
 
     def rows(self, found: RowPoses) -> None:
-        """Write poses or points, some thousand at a time where the format holds rows."""
+        """Write poses or points, in blocks if the format holds rows."""
         from frametool.rows.batch import kept, values_of
         from frametool.rows.conversion import Blocks
         from frametool.rows.sinks.results import TOGETHER
@@ -174,7 +174,7 @@ class Output:
             raise ValueInvalid(f"{self.style.format} has no place for {names}; write csv, json, yaml or text")
 
     def text_of(self, found: list[Value]) -> str:
-        """Return the text of all results; warn of fields that the format cannot hold."""
+        """Return the text of all results; warn of extras that the format cannot hold."""
         self._refuse_places()
         poses = [each for each in found if isinstance(each, Result)]
         if len(poses) < len(found) and self.style.format != "csv":
@@ -182,7 +182,7 @@ class Output:
                 raise ValueInvalid(f"{self.style.format} holds poses; a point has no rotation")
             mappings = [each.mapping(self.style) if isinstance(each, Result) else each for each in found]
             placed = [each for each in mappings if not {"point", "vector"}.isdisjoint(each) and "header" not in each]
-            # text has one per line, but mappings for those with more than three numbers
+            # as text, points and vectors are one per line if all are lists of numbers; otherwise all records are YAML
             is_plain = all(any(isinstance(each.get(kind), list) for kind in ("point", "vector")) for each in mappings)
             text_module = "frametool.view.text" if is_plain else table.FORMATS["yaml"].writer
             text, others = self._module(text_module).write_points(mappings, self.style), {*chain.from_iterable(placed)}
@@ -217,8 +217,9 @@ class Output:
     def _batches(self, results: Iterator[Result]) -> Iterator[str | bytes]:
         """Yield the text of results in batches of growing size.
 
-        In every format the text of several results begins with that of the first one.  Each batch is written behind
-        the first result, whose text is then cut off.
+        In every format the text of several results begins with that of the first one.  Each batch is formatted after
+        the
+        first result, whose text is then cut off.
         """
         write_poses = self._module("frametool.view.text").write_poses
         size = 2
@@ -243,7 +244,7 @@ class Output:
         return Blocks(self.style)
 
     def tree(self, tree: Frames, color: str = "auto") -> None:
-        """Write a tree: in colour on a terminal or as `color` says; with every sample in a format of poses."""
+        """Write a tree; as text in colour if `color` says so; in a format of poses with every sample."""
         if tree.drawn and self._format_is_default:
             self.style = self.style.changed(format="text")
         if tree.drawn and self.style.format != "text":
@@ -308,7 +309,7 @@ class Output:
             self.report_suffix()
 
     def shown(self, text: str) -> str:
-        """Return text as it is written: in the text format printable, and on a terminal in colour."""
+        """Return text as it is written: the text format printable, and in colour on a terminal."""
         if self.style.format == "text":
             text = "\n".join(map(printable, text.split("\n")))
             return in_colour(text, self.marks) if self.style.screen else text
@@ -319,9 +320,9 @@ class Output:
         return writing(self.path, force=self.force, folder=self.style.format in table.FOLDERS)
 
     def report_suffix(self, fmt: str = "") -> None:
-        """Report the format of an output file if its suffix names none and --format is not set.
+        """Report the format of an output file if no format has its suffix and --format is not set.
 
-        fmt: of a stream that is written in the format of its input: its own suffixes and those of text are not reported
+        fmt: format of a stream that is written as it was read: its suffixes and those of text are not reported
         """
         if not self._format_is_default or not self.path or any(map(self._inputs.peek, ("quiet", "explain"))):
             return

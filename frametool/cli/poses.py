@@ -28,11 +28,11 @@ if TYPE_CHECKING:
     from frametool.rows.request import Request
 
 INLINE = "argument"
-# records and tables begin with one of these, each compiled when first needed
+# patterns of the beginning of records and tables
 _MAPPING = r'\s*\{\s*["}\w][^,{]*:'
 _HEADER = r"""\s*(?![ijk]\s*$|[xyzw]:\s*[-+.\d]+\s*,|Out\[)[A-Za-z_"'%#][\w"'-]*\s*(?:[,:\t]|$)"""
 _COMMAS = r"\s*[-+]?[.\d][-+.\deE]*(?:[ \t]*,[ \t]*[-+]?[.\d][-+.\deE]*)+[ \t\r]*(?:\n|\Z)"
-# pasted text that looks like the header of a table; the last: GTSAM, Gazebo, tf2_echo
+# pasted text that looks like the header of a table; the last two patterns: GTSAM, Gazebo, tf2_echo
 _NO_HEADER = r"\s*[A-Za-z_]\w*:\s*\n|\s*\w+\s*=|\s*(?:R|Model|- Pose[^:]*|Translation):\s*\[|\s*Rotation: in "
 
 
@@ -81,8 +81,8 @@ def pasted_stream(
 ) -> tuple[Source | None, BufferedReader]:
     """Return pasted text in a stream as a source in the grammar of poses, else None; and the unread stream.
 
-    The stream is only read to its end if it begins in a way that no valid stream of rows or records does.
-    notation, place: the notation, or the format of geodetic positions, of --from
+    The stream is read to its end only if it begins as no valid stream of rows or records does.
+    notation, place: the representation, or the format of geodetic positions, of --from
     """
     head = stream.peek()[:4096].decode("utf-8", "replace").lstrip("\ufeff")
     if (re.match(_MAPPING, head) or re.match(_HEADER, head)) and not re.match(_NO_HEADER, head):
@@ -116,7 +116,7 @@ def _inverted(text: str) -> re.Match[str] | None:
 
 
 def without_inverse(argument: str) -> tuple[str, bool]:
-    """Return an argument without `inv(..)` and `~`, and True if its inverse is meant; two inverses cancel.
+    """Return an argument without `inv(..)` and `~`, and True if an odd number of them was removed.
 
     Raises click.UsageError if no pose is left.
     """
@@ -128,7 +128,7 @@ def without_inverse(argument: str) -> tuple[str, bool]:
 
 
 def _inverses(source: Source, request: Request) -> Source:
-    """Return a source with the inverses of the poses of another one, as `invert -f json` writes them."""
+    """Return a source with the inverse of each pose of another source, as `invert -f json` writes them."""
     from frametool.documents.writers import dump_json
     from frametool.geometry.representations import notation
     from frametool.grammar.result import Style
@@ -165,7 +165,7 @@ def source_of(argument: str | Source) -> Source:
 def pose_source(argument: str | Source, request: Request) -> Source:
     """Return the source of an argument as `source_of` does, with pasted text rewritten in the grammar of poses.
 
-    If the request moves records, three numbers are a point.
+    In requests that move records, three numbers are a point.
     """
     if not isinstance(argument, Source):
         bare, is_inverse = without_inverse(argument)
@@ -197,7 +197,7 @@ def values_of(arguments: Sequence[str | Source], request: Request, output: Outpu
 def read_with(
     argument: str | Source, request: Request, read: Callable[[Source, Request], Iterable[Any]]
 ) -> Iterator[Any]:
-    """Yield what `read` finds in an argument: inline, `-`, or a file; an error for a file of frames hints at lookup."""
+    """Yield what `read` finds in an argument: inline, `-`, or a file; errors for files of frames suggest lookup."""
     with inline_misuse():
         source = pose_source(argument, request)
         try:
@@ -222,7 +222,10 @@ def inline_misuse() -> Iterator[None]:
 
 
 class ArgumentPoses(NamedTuple):
-    """The poses of an argument, their extra keys, and its warnings."""
+    """The poses of an argument.
+
+    others: names of extra keys; warnings: message and rule of each warning, not yet emitted
+    """
 
     source: Source
     poses: list[Pose]
@@ -230,7 +233,7 @@ class ArgumentPoses(NamedTuple):
     warnings: list[tuple[Any, ...]]
 
     def only_poses(self, *, timed: bool) -> list[Pose]:
-        """Return the poses; emit the warnings, and one on extra keys that are left out, except stamps if `timed`."""
+        """Return the poses, and emit the warnings; also warn of extra keys, except stamps if `timed`."""
         for message, rule in self.warnings:
             warn(message, rule=rule)
         left_out = [key for key in sorted(self.others) if not (timed and stamp_column([key]) is not None)]
@@ -239,7 +242,7 @@ class ArgumentPoses(NamedTuple):
         return self.poses
 
     def only_pose(self, *, timed: bool = False) -> Pose:
-        """Return the single pose as `only_poses` does; raises click.UsageError for several."""
+        """Return the single pose, with the warnings of `only_poses`; raises click.UsageError for several."""
         refuse(len(self.poses) != 1, f"one pose is wanted here, {self.source.name} holds {len(self.poses)}")
         return self.only_poses(timed=timed)[0]
 
@@ -270,8 +273,8 @@ def _several(read: Sequence[ArgumentPoses | None]) -> list[int]:
 class Operands(NamedTuple):
     """The argument with the records, each of which has a result, and the single poses of the other arguments.
 
-    at: the index of that argument
-    before, behind: the poses of the arguments before and behind it
+    at: the index of the argument with the records
+    before, behind: the poses of the arguments to the left and right of it
     timed: the common stamp of single poses, {} without one; None if each result has the stamp of its record
     """
 
@@ -310,7 +313,7 @@ def rows_among(arguments: Sequence[str], request: Request, task: Task) -> Operan
 
 
 def combinations(arguments: Sequence[str], request: Request) -> list[tuple[Pose, ...]]:
-    """Return tuples of one pose per argument; if one argument has several poses, there is a tuple for each of them."""
+    """Return tuples of one pose per argument: one tuple, or one for each pose of the argument with several."""
     found = [_read_argument(each, request) for each in arguments]
     several = _several(found)
     read = [each.only_poses(timed=True) for each in found]
@@ -319,12 +322,12 @@ def combinations(arguments: Sequence[str], request: Request) -> list[tuple[Pose,
 
 
 def one_pose(argument: str | Source, request: Request) -> Pose:
-    """Read the single pose of an argument; warn of extra keys."""
+    """Return the single pose of an argument; warn of extra keys."""
     return _read_argument(argument, request).only_pose()
 
 
 def pose_from_numbers(texts: Sequence[str], request: Request) -> Pose:
-    """Read bare numbers; raises click.UsageError for an invalid list, NotARotation if they are not a rotation."""
+    """Read a pose from bare numbers; raises click.UsageError, or NotARotation for an invalid rotation."""
     reading = Reading(Source(INLINE, ""), degrees=request.rows.degrees, normalize=request.rows.normalize)
     with misuse():
         found = pose_of_numbers(texts, request.rows.given, reading)

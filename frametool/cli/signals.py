@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from types import FrameType
 
-# those that the system has, with their names: Windows has no SIGHUP
+# number -> name of the signals that the system has: Windows has no SIGHUP
 ENDING = {getattr(signal, name): name for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)}
 
 
@@ -20,11 +20,11 @@ class Terminated(BaseException):
 
 
 class _Signals:
-    """The handler of signals, and the state that decides what it does.
+    """The handler of signals, and the state that determines what it does.
 
-    owns_process: the program runs as a process of its own
-    cleans_up: something must be cleaned up, so an exception is raised even during an import
-    writing: a block of lines is being written; interrupted: Ctrl-C came meanwhile
+    owns_process: the program is the whole process, not called by another program
+    cleans_up: there is something to clean up, so an exception is raised even during an import
+    writing: a block of lines is being written; interrupted: Ctrl-C was pressed meanwhile
     """
 
     owns_process = False

@@ -25,17 +25,17 @@ if TYPE_CHECKING:
 
     Write = Callable[[str | bytes | memoryview], None]
 
-CHECKS: list[Callable[[], None]] = []  # called before anything is written; each raises an error for a wrong call
+CHECKS: list[Callable[[], None]] = []  # called before anything is written; each may raise a usage error
 BAG_FILE, BAG_DATA = "metadata.yaml", (".mcap", ".db3")  # a folder with other files is not replaced
 STYLES = {"bold": 1, "dim": 2, "red": 31, "green": 32, "magenta": 35, "cyan": 36}  # legible on dark and light
-HELP_MARKS = (  # of helps, topics, formats and the cookbook
+HELP_MARKS = (  # patterns with a style in help texts: of commands, topics, formats and the cookbook
     r"(?m)^ +(?P<green>(?:\$ .*|(?:frametool|printf|sed) .*))",
     r"\A(?P<bold>Usage:|(?!Usage:).*)",
     r"(?m)^(?P<bold>[A-Za-z][\w ]*(?: \([^)\n]*\))?:|\S.*\?)$",
     r"(?m)^  (?P<cyan>[a-z][\w-]*)  +(?=\S)",
     r"(?<![\w-])(?P<cyan>--?[a-zA-Z][\w-]*)",
 )
-LONGEST_BEGIN = 40  # characters of the final name in that of the temporary file: names have 255 bytes
+LONGEST_BEGIN = 40  # characters of the final name in that of the temporary file: names are limited to 255 bytes
 
 
 @contextmanager
@@ -97,9 +97,9 @@ def _replacing(path: str, *, force: bool, folder: bool) -> Iterator[Write]:
 
 
 def in_colour(text: str, marks: Iterable[str]) -> str:
-    """Return text for a terminal, with each named group of the patterns in the style of its name, unless NO_COLOR.
+    """Return text for a terminal: each named group of the patterns has the style of its name; unchanged with NO_COLOR.
 
-    If two overlap, the first pattern is used.
+    Where two overlap, the first pattern is used.
     """
     if os.environ.get("NO_COLOR") or os.environ.get("TERM") in ("dumb", "unknown"):
         return text
@@ -131,7 +131,7 @@ def show(text: str, *, paged: bool) -> None:
 
 
 def check() -> None:
-    """Run all CHECKS, which raise an error for a wrong call."""
+    """Call all CHECKS."""
     for each in CHECKS:
         each()
 
@@ -191,7 +191,7 @@ def writer_into(stream: BinaryIO, name: str) -> Write:
 
 @contextmanager
 def file_errors(name: str) -> Iterator[None]:
-    """Turn errors of the system into FileProblem with the name of the file; a closed pipe is not one."""
+    """Convert errors of the system into FileProblem with the name of the file, except for a closed pipe."""
     try:
         yield
     except BrokenPipeError:
@@ -268,7 +268,7 @@ def folded(line: str) -> str:
 def say_warning(message: str, rule: str = "") -> None:
     """Write a warning.
 
-    --quiet suppresses the warning on names that lost their leading slash: the tree is as intended.  The warning on the
+    With --quiet, the warning about a leading slash in names is omitted: the tree is as intended.  The warning about the
     unit that is assumed for stamps by their size is written once.
     """
     if rule in ("slash", "by-size"):
@@ -304,7 +304,7 @@ def say_error(error: FrametoolError, *, in_json: bool = False, fate: str = "") -
 def say_first(
     texts: Sequence[Any], most: int, more: str, report: Callable[[Any], object], end: Callable[[str], object] = say
 ) -> None:
-    """Report the first `most` and the number of the others; a single one more is reported instead of counted."""
+    """Report the first `most` texts, or one more if that is all, and the number of the others."""
     most += len(texts) == most + 1
     for each in texts[:most]:
         report(each)
@@ -313,7 +313,7 @@ def say_first(
 
 
 def discard(stream: TextIO) -> None:
-    """Redirect a stream to the null device, so that its buffer does not raise again when the process ends."""
+    """Redirect a stream to the null device, so that flushing its buffer does not fail again when the process ends."""
     with suppress(OSError):
         os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
 
@@ -322,7 +322,7 @@ SYSTEM_ERRORS = (MemoryError, ImportError, OSError)
 
 
 def system_message(error: Exception) -> str:
-    """Return the message of an error of Python or the system."""
+    """Return the message for an error of Python or the system."""
     if isinstance(error, MemoryError):
         return "out of memory"
     if isinstance(error, ImportError):  # numpy's message has many lines, the cause is the last

@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from frametool.rows.request import Request
     from frametool.rows.samples import MeanRows
 
-TOP = 2  # lines of a table up to its first row: an error there may be in every row
+TOP = 2  # lines of a table up to its first row: an error in these is probably in every row
 BAGS = tuple(name for name, row in FORMATS.items() if row.reader == BAG)
 _MAGICS: list[Any] = [what for name in BAGS for kind, what in FORMATS[name].magic if kind == "magic"]
 RECORDS = readers("records")
@@ -71,18 +71,18 @@ EXPLAIN = explain_option()
 
 
 class Task:
-    """The task of a command: its stream or arguments, and the output of its results, by the options.
+    """The work of one command: its stream or arguments, and the output of its results, by the options.
 
-    plan: the style of the derivation, with --explain
-    window: the first and last nanosecond of --start and --stop
+    plan: the style of the derivation with --explain, else None
+    window: the first and last nanosecond of --start and --stop, None without both
     """
 
     _opened: BufferedReader | None = None
-    within = ""  # the format of the records in a bag
+    within = ""  # the format of records that were extracted from a bag or a cloud
     plan: Style | None = None
 
     def __init__(self, inputs: Inputs, *what: str, output: Output | None = None) -> None:
-        """Look at the options; they are marked as used where they have an effect.
+        """Read the options; those that have an effect here are marked as used.
 
         what: the kinds of results of the command, unless `output` is passed
         """
@@ -104,7 +104,7 @@ class Task:
             self.plan = output.style.changed(precision=significant(inputs.precision), notations=notations)
 
     def opened(self) -> BufferedReader:
-        """Open the input once, because a pipe cannot be read twice; raises FileProblem."""
+        """Return the opened input, always the same stream, because a pipe cannot be read twice; raises FileProblem."""
         if self._opened is None:
             self.inputs.use("input_path")
             name = "-" if self.path is None else self.path
@@ -139,7 +139,7 @@ class Task:
         return self._opened
 
     def read_clouds_as_rows(self) -> None:
-        """Replace a cloud by its points as rows of CSV, to which columns can be added."""
+        """Replace a cloud by rows of CSV with its points, to which columns can be added."""
         from frametool.formats.detect import by_sign
 
         opened = self.opened()
@@ -169,7 +169,7 @@ class Task:
         return bool(self.opened().peek(1))
 
     def has_table(self, argument: str) -> bool:
-        """Return True and stream the file of an argument if it is a table, a bag, or a pipe, as `<(command)`.
+        """Return True if the file of an argument is a table, a bag, or a pipe (`<(command)`), which then is the stream.
 
         A pipe can be read only once, so it is streamed whatever its format is.
         """
@@ -197,9 +197,9 @@ class Task:
         return fmt
 
     def run(self, request: Request, rows: MeanRows | None = None) -> int:
-        """Run the stream and return its exit status; a FormatError gets a hint what to do.
+        """Run the stream and return its exit status; a FormatError gets a hint about what to do.
 
-        rows: receives the results instead of the output
+        rows: collects the results, which are then not written
         """
         from frametool.formats.detect import with_hint
 
@@ -281,7 +281,7 @@ class Task:
         return chosen or detect(begin, *options.STREAMED, name=name or self.path or "", otherwise=otherwise)
 
     def _outcomes(self, stream: Any, fmt: str, request: Request) -> tuple[Generator[Outcome], str, Diagnostics | None]:
-        """Choose how rows become results: as columns of numbers, as poses in another format, or in place.
+        """Return the results of the rows: as columns of numbers, as poses in another format, or in place.
 
         Also returns the format of the results, and the diagnostics of the input format.
         """
@@ -315,7 +315,7 @@ class Task:
         return run_table(stream, fmt, request, source=self.name, header=not self.inputs.no_header), fmt, None
 
     def _steps(self, stream: Any, fmt: str, request: Request) -> Iterator[Step]:
-        """Return the results of each block as poses that are not written."""
+        """Return the results of each block as poses, without writing them."""
         from frametool.cli.trees import answers
         from frametool.rows.samples import steps_of
 
@@ -326,7 +326,7 @@ class Task:
         return steps_of(stream, fmt, request, self.name, answers=answers(self.inputs), header=header)
 
     def _records(self, stream: Any, fmt: str, request: Request, chosen: str) -> tuple[Generator[Outcome], str]:
-        """Return the results of records, in place or in the chosen format, and that format."""
+        """Return the results of records, in place or in the chosen format, and the format."""
         from frametool.rows.sources.records import run_records
 
         if chosen in ("", fmt):
@@ -342,7 +342,7 @@ class Task:
         return written_by(self.output.writer(), outcomes, request.on_error), chosen
 
     def _columns(self, stream: Any, fmt: str, request: Request) -> Generator[Outcome]:
-        """Return the results as columns of numbers, in the input's format or another one of such columns."""
+        """Return the results as columns of numbers, in the input's format or another format of columns."""
         from frametool.rows.sources.column_files import OtherColumns, run_columns
 
         output = self.output
@@ -361,7 +361,7 @@ class Task:
         return BadRows(name, self.inputs.on_error, most=self.inputs.max_errors, tell=tell, counted=counted)
 
     def _with_stream_options(self, request: Request, fmt: str, *, alone: bool) -> Request:
-        """Add the options of the stream to the request; alone: the results are written, not collected."""
+        """Add the options of the stream to the request; alone: True if the results are written, not collected."""
         inputs, output = self.inputs, self.output
         is_table = fmt not in RECORDS
         adds = bool(request.rows.poses) or request.operation.formula is None  # formulas alone append anyway
@@ -415,13 +415,13 @@ class Task:
         return made
 
     def only_arguments(self, arguments: Sequence[str | Source | None]) -> None:
-        """Mark --in as used if one of the arguments is a file; raise a usage error if -i is set too."""
+        """Mark --in as used if an argument is a file; raises a usage error if -i is set too."""
         refuse(self.path is not None, "-i FILE and arguments are two inputs; give one")
         if any(isinstance(each, str) and os.path.exists(each) for each in arguments):
             self.inputs.use("input_formats")
 
     def stream_request(self, arguments: Sequence[str], request: Request) -> Request | None:
-        """Return the request for the stream if the only argument is `-`, a table, or their inverse; else None."""
+        """Return the request for the stream if the only argument is `-`, a table, or an inverse of these; else None."""
         bare, is_inverse = without_inverse(arguments[0]) if arguments else ("-", False)
         if len(arguments) > 1 or (bare != "-" and (self.path or not self.has_table(bare))):
             return None
@@ -430,7 +430,7 @@ class Task:
     def write_results(self, argument: str | Source, request: Request, timed: dict[str, Any] | None = None) -> int:
         """Write the results of the records of one argument: inline, a file, or the stream of the command.
 
-        timed: replaces the stamp of a single result; {} removes it
+        timed: replaces the stamp of each result; {} removes it
         """
         if isinstance(argument, str) and (streamed := self.stream_request([argument], request)):
             return self.run(streamed)
@@ -444,7 +444,7 @@ class Task:
         return 0
 
     def read_written(self, argument: str | Source | None, *, warned: bool = False) -> WrittenPose:
-        """Read the single pose of an argument with its original notation, for a derivation.
+        """Read the single pose of an argument with its original representation, for a derivation.
 
         warned: its warnings were already written
         """
@@ -479,7 +479,7 @@ def open_columns(file: InputFile, fmt: str) -> Any:
 
 
 def is_bag(path: str) -> bool:
-    """Return True for a bag, by its first bytes, its suffix if empty, or its folder."""
+    """Return True for a bag, by its first bytes (for an empty file by its suffix), or for the folder of one."""
     if not os.path.isfile(path):
         from frametool.formats.detect import of_folder
 
@@ -498,6 +498,6 @@ def significant(precision: int | None) -> int | None:
 
 
 def one_argument(argument: str | Source | None) -> str | Source:
-    """Return an argument with a record; raises click.UsageError for standard input, which is a stream."""
+    """Return an argument with a record unchanged; raises click.UsageError for standard input, which is a stream."""
     refuse(argument in (None, "-"), f"standard input is a stream; {ONE_RECORD}")
     return argument or ""

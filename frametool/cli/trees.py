@@ -28,7 +28,8 @@ if TYPE_CHECKING:
     from frametool.frames.lookups import Frames
 
 INLINE = ("{", "[")  # a tree on the command line begins with one of these
-# field of Answers -> its parameters; whether the others have an effect depends on formats and moving frames
+# fields of Answers that are marked as used elsewhere: whether they have an effect depends on formats and motion;
+# other field -> its parameters
 USED_ELSEWHERE = ("time_offset", "frames", "camera_axes")
 ANSWER_OPTIONS: dict[str, tuple[str, ...]] = {name: (name,) for name in Answers._fields if name not in USED_ELSEWHERE}
 ANSWER_OPTIONS["order"] = "order", "from_rep"
@@ -38,7 +39,7 @@ OF_FILES = (*Answers._fields, "named_frames", "from_rep", "input_formats", "topi
 def load_tree(
     inputs: Inputs, argument: str, more: Sequence[str] = (), *, streams: bool = False, drawings: bool = False
 ) -> Frames:
-    """Read the tree of an argument and merge further files into it; report what is assumed of their formats.
+    """Read the tree of an argument and merge further files into it; report what is assumed about their formats.
 
     streams: the command also reads a stream; the last --in that can be streamed is the format of the stream
     drawings: accept a file without poses too, if it is the only one
@@ -48,7 +49,10 @@ def load_tree(
 
 
 def load_sides(inputs: Inputs, a: Sequence[str], b: Sequence[str]) -> list[tuple[Frames, dict[str, EdgePlace]]]:
-    """Read two trees to compare, each of several files, as `load_tree` does; with the location of each frame."""
+    """Read two trees to compare, each of several files, as `load_tree` does.
+
+    Returns each tree with the places of its frames.
+    """
     refuse_two_readers((*a, *b))
     count = len(a) + len(b)
     sides: list[tuple[Frames, dict[str, EdgePlace]]] = []
@@ -62,9 +66,9 @@ def load_sides(inputs: Inputs, a: Sequence[str], b: Sequence[str]) -> list[tuple
 def _load(
     inputs: Inputs, arguments: Sequence[str], rules: Mapping[str, Any], *, placed: bool = False, **how: Any
 ) -> tuple[Frames, dict[str, EdgePlace]]:
-    """Merge files into a tree and return it with the location of each frame; a batch caches unchanged files.
+    """Merge files into a tree and return it with the places of its frames; a batch caches unchanged files.
 
-    rules: fields of Rules; placed: collect the locations
+    rules: fields of Rules; placed: collect the places
     how: options of `opened`
     """
     from frametool.formats.load import Rules, load_sources  # not every command that may read trees does
@@ -94,15 +98,15 @@ def _load(
 
 
 def lookups_in(inputs: Inputs, tree: Frames, *, carried: bool) -> Lookups:
-    """Return the lookups of a command; report covariances that are not used."""
+    """Return the lookups in a tree; report covariances that are not used."""
     inputs.note(f"sigmas of {bare(tree.name)} not used (--covariance)" if tree.covariances and not carried else None)
     return Lookups(tree, carried=carried)
 
 
 def report_files(inputs: Inputs, files: Sequence[FrameFile]) -> None:
-    """Report on stderr what was assumed of files that were read; with -v also their formats.
+    """Report on stderr what was assumed about the files read; with -v also their formats.
 
-    --topic has an effect if one of them has topics.
+    --topic is marked as used if one of them has topics.
     """
     for file in files:
         if file.topics.counts or file.topics.seen:
@@ -119,7 +123,7 @@ def opened(
     """Open trees and recordings: files, `-` for standard input, `.` for FRAMETOOL_TREE, or inline trees.
 
     streams: as in `load_tree`
-    behind: the number of files before these, whose --in and --frames are skipped unless there are no more
+    behind: the number of files before these; that many --in and --frames are skipped, unless there are no more
     of: the number of all files
     drawings: accept files without poses too
     """
@@ -156,7 +160,7 @@ def opened(
         for file in found:
             file.close()
         raise click.UsageError(f"--frames appears {len(named)} times, {len(lacking)} of the files need names")
-    if len(named) == 1:  # for poses without any names, if there are some, not for files with default names
+    if len(named) == 1:  # names are for files of poses without names, if there are some, not for those with defaults
         lacking = [file for file in lacking if "rows" in FORMATS[file.format].reads] or lacking
     for file, names in zip(found if len(named) == files else lacking, named[behind:] or named, strict=False):
         file.answers = file.answers._replace(frames=names)
@@ -182,7 +186,7 @@ def answers(inputs: Inputs) -> Answers:
 
 
 def tree_file(argument: str) -> str:
-    """Return the file of an argument: for `.` that of FRAMETOOL_TREE."""
+    """Return the file of an argument; `.` is the file that FRAMETOOL_TREE names."""
     named = os.environ.get("FRAMETOOL_TREE") if argument == "." else argument
     refuse(argument == "." and not named, "TREE is . but FRAMETOOL_TREE is not set; name a file")
     return named or ""
@@ -200,7 +204,7 @@ FRAME = Text(offers=_offer_frames)
 
 
 def frame_name(name: str, tree: Frames | Robot) -> str:
-    """Return the name of a frame in a tree: without the leading `/` of old tf; ecef and earth are one frame."""
+    """Return the name that a frame has in a tree: without the leading `/` of old tf; ecef and earth are one frame."""
     if name in EARTH_FRAMES and name not in tree.frames:
         return next((other for other in EARTH_FRAMES if other in tree.frames), name)
     return name if name in tree.frames else without_slash(name)
@@ -212,7 +216,7 @@ def lookup_time_ns(chosen: int | str | None) -> int | None:
 
 
 def without_slash(name: str) -> str:
-    """Return a frame's name without a leading `/`; warn of one."""
+    """Return a frame's name without a leading `/`, with a warning."""
     if is_slashed(name):
         warn(f"frame {shown(name)}: the leading / is no part of a name and was left out")
     return name[is_slashed(name) :]

@@ -1,4 +1,4 @@
-"""Hold the table of commands, import each when it is called, and call it; help and completion come from the table."""
+"""The table of commands; each command is imported when it is called, help and completion come from the table."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ class Group(WithHelp, click.Group):
     """The commands of a table, name -> (module, what it does), each imported when it is called."""
 
     def __init__(self, *args: Any, table: Mapping[str, tuple[str, str]] = COMMANDS, **kwargs: Any) -> None:
-        """Keep the table."""
+        """Store the table."""
         super().__init__(*args, **kwargs)
         self.table = table
 
@@ -188,7 +188,7 @@ def _print_completions(wanted: str, line: str) -> int:
     if wanted == "words":
         from click.shell_completion import ShellComplete, split_arg_string
 
-        *words, begun = split_arg_string(f"{line}.")  # the point: behind a space a new word begins
+        *words, begun = split_arg_string(f"{line}.")  # because of the point, a new word begins after a space
         option = begun[: begun.find("=") + 1] if begun.startswith("--") else ""  # --NAME= is part of the word
         before = list(map(os.path.expanduser, words[1:]))
         found = ShellComplete(group, {}, "frametool", COMPLETION).get_completions(before, begun[:-1])

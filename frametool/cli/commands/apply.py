@@ -51,7 +51,10 @@ _WRITTEN = f"formats: {', '.join(writers('arrays'))}"
 
 
 def _write_cloud(cloud: PointCloud, pose: Components, output: Output, path: str, names: dict[str, int]) -> None:
-    """Write a moved cloud of a bag to its file; names: the files written before, each with its message's number."""
+    """Write a moved cloud of a bag to its file.
+
+    names: file written before -> the number of its message
+    """
     from frametool.rows.sources.column_files import moved_cloud
 
     texts = {place: re.sub(r"[/\0]|^\.+", "_", text(cloud)) for place, text in PLACEHOLDERS.items()}  # no path
@@ -71,7 +74,7 @@ def _write_cloud(cloud: PointCloud, pose: Components, output: Output, path: str,
 def bag_of_clouds(task: streaming.Task) -> Callable[[Mover], int]:
     """Return a function that moves the clouds of the bag of -i, writes each to its file and returns the exit status.
 
-    Topics of --topic that are not clouds are left to the tree.
+    Topics of --topic that are not clouds remain for the tree.
     """
     from frametool.recordings.contents import cloud_topics, read_clouds
     from frametool.recordings.read import opened_recording
@@ -118,7 +121,7 @@ def bag_of_clouds(task: streaming.Task) -> Callable[[Mover], int]:
 
 
 def several_clouds(task: streaming.Task) -> Callable[[Mover], int]:
-    """Return a function that merges the clouds of several -i, each in a frame of its own or all in SOURCE, into one.
+    """Return a function that merges the clouds of several -i into one, each in its own frame or all in SOURCE.
 
     --frames and the --in of clouds are then not available to the tree.
     """
@@ -254,12 +257,12 @@ def _derived(task: streaming.Task, plan: Style, mover: Mover, record: str | Sour
 class Mover:
     """Transforms records by one pose; if the pose names its frames, records must be expressed in its source.
 
-    target: the frame of the results, if it has a name
-    source: the frame of the records, if it has a name; with a tree None if each record names its own
+    target: the frame of the results, None without a name
+    source: the frame of the records, None without a name or, with a tree, if each record names its own
     uncertain: use the covariance of the transform, which follows its seven components
-    has_source: all records are expressed in one frame
-    counters: no frame has a number for its name, so that a number in a frame column is a counter
-    rest: the arguments that are records; is_stream: a stream replaces them
+    has_source: True if all records are expressed in one frame
+    counters: True if no frame has a number for its name, so that a number in a frame column is a counter
+    rest: the arguments that are records; is_stream: True if the records are a stream instead
     into: the frame of the results, for messages
     timed: transforms records at their own times; None if all use one time
     """
@@ -282,7 +285,7 @@ class Mover:
         self.pose = pose if self.uncertain else pose._replace(covariance=None)
 
     def from_frame(self, own: str | None, own_ns: int | None = None) -> Components:  # noqa: ARG002 - of a tree
-        """Return the transform of records from a frame, at a time or the latest."""
+        """Return the transform of records expressed in a frame, at a time or the latest."""
         _agreed_frame(own, self.source)
         return self.pose.placed
 
@@ -335,7 +338,7 @@ class TreeMover(Mover):
             refuse(late, "rows move at the latest time; make --stamps a column first, by convert -f tum, or give --at")
 
     def start(self, own: str | None) -> str:
-        """Return the frame in which records are expressed: SOURCE, or the one that they name."""
+        """Return the frame in which a record is expressed: SOURCE, or its own; raises ValueInvalid if it is unknown."""
         if own and own not in self._resolved:
             self._resolved[own] = frame_name(own, self.tree)
         if (frame := _agreed_frame(own and self._resolved[own], self.source)) is None:
@@ -343,11 +346,11 @@ class TreeMover(Mover):
         return frame
 
     def from_frame(self, own: str | None, own_ns: int | None = None) -> Components:
-        """Return the transform of records from a frame, at the time of all, at their own, or the latest."""
+        """Return the transform of records expressed in a frame: at --at, at their own time, or the latest."""
         return self.lookups.one(self.target, self.start(own), own_ns if self.at is None else lookup_time_ns(self.at))
 
     def at_times(self, own: str | None, times_ns: Any) -> Components:
-        """Return columns of these transforms at many times; nan where there is no data."""
+        """Return the transforms of records expressed in a frame at many times, as columns; nan for missing data."""
         return self.lookups.many(self.target, self.start(own), times_ns)
 
 
@@ -365,17 +368,17 @@ def is_record(argument: str) -> bool:
 
 
 def begins_number(argument: str) -> bool:
-    """Return True for an argument that begins as one number of a point."""
+    """Return True for an argument that begins like one of the three numbers of a point."""
     return argument.lstrip("-+.")[:1].isdigit() and "," not in argument
 
 
 def _is_apart(argument: str) -> bool:
-    """Return True for an argument that is not a number of a point: a record, pasted text, or empty."""
+    """Return True for an argument that is a whole record, pasted text, or empty, not one number of a point."""
     return not argument or is_record(argument) or (not begins_number(argument) and is_pasted(argument))
 
 
 def sources_of(inputs: Inputs, arguments: Sequence[str], kind: str = "", place: str = "") -> Iterator[str | Source]:
-    """Yield the texts of records: bare numbers in threes become points, the rest is unchanged."""
+    """Yield the texts of records: three bare numbers become a point, other arguments are unchanged."""
     if place and not any(map(is_record, arguments)):
         from frametool.cli.earth_options import mapping_of
 

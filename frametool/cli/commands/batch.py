@@ -156,7 +156,7 @@ _ASSIGNMENT = re.compile(rf"[ \t]*({NAME})[ \t]*=[ \t]*")
 def command_lines(stream: BinaryIO) -> Iterator[tuple[int, str, str]]:
     """Yield the commands of a batch, each as soon as its last line arrives; a line ending in a backslash is continued.
 
-    Yields the number of its first line, the name of its result, "" if it is printed, and its text.
+    Yields the number of the first line, the name of the result ("" if it is printed), and the text.
     """
     begin, text = 0, ""
     for number, data in enumerate(chain(iter(stream.readline, b""), [b""]), 1):
@@ -172,7 +172,7 @@ def command_lines(stream: BinaryIO) -> Iterator[tuple[int, str, str]]:
         begin, text = 0, ""
 
 
-READABLE = (None, "json", "yaml")  # formats that JSON replaces for kept results; others are for printing
+READABLE = (None, "json", "yaml")  # chosen formats that are replaced by JSON for kept results; others are refused
 KEPT_ARE = "a name keeps one pose, point, number or tree"
 
 
@@ -196,14 +196,14 @@ NO_INPUT = "standard input is not for the lines of a batch; name a file, or keep
 
 
 class LineFailed(FrametoolError):
-    """Report a command that has reported its error itself, by its status."""
+    """The error of a line whose command has already reported its error and returned a status."""
 
 
 class CommandBatch:
     """Runs the commands of a batch; holds what they share: kept results, trees, the exit status.
 
     source: the name of the batch in messages
-    skips: continue after a line that fails
+    skips: True to continue after a line that fails
     """
 
     def __init__(self, source: str, *, skips: bool) -> None:
@@ -213,7 +213,7 @@ class CommandBatch:
         self.kept: dict[str, str | int] = {}  # name -> its result as JSON, or the number of its line if that failed
         self.context = click.Context(group, info_name="frametool", obj=ReadCache())
         self.count = self.failed = self.status = 0
-        self.in_json = True  # all lines that failed have -f json
+        self.in_json = True  # False once a line without -f json fails
 
     def run(self, stream: BinaryIO) -> int:
         """Run the commands of a stream as they arrive and return the exit status of the batch."""
@@ -239,7 +239,10 @@ class CommandBatch:
         return ROWS_SKIPPED
 
     def _run_line(self, text: str, name: str, number: int) -> int:
-        """Run one command, whose result may be kept under a name, and report its error; return its status."""
+        """Run one command and report its error; return its status.
+
+        name: that under which its result is kept, "" to print it
+        """
         words: list[str] = []
         status = 0
         problem: FrametoolError
@@ -266,7 +269,7 @@ class CommandBatch:
         return status or TROUBLE.get(words[0] if words else "", problem.exit_code)
 
     def _call(self, words: list[str], name: str) -> int:
-        """Call a command and return its status; with a name keep its result."""
+        """Call a command and return its status; with a name, keep its result."""
         if words[0] in REFUSED:
             raise Misused(REFUSED[words[0]])
         self.context.meta.clear()

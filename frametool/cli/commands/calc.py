@@ -41,7 +41,7 @@ LIKE_A_FILE = r"(?!row\.)[^\s(){}\[\]*<>\"']*\.[A-Za-z]\w*"
 
 
 def file_named_in(inputs: Inputs, text: str, scope: Scope) -> Term | None:
-    """Bind the name of `NAME=FILE` to the content of the file, or of `-`, and return it; None for other texts.
+    """Bind the name of `NAME=FILE` (`-`: standard input) to the file's content and return that; None for other texts.
 
     A text that looks like a file name must be an existing file.  Raises FileProblem, FormatError.
     """
@@ -90,7 +90,7 @@ EXPRESSION = Text(offers=_offer_words)
 
 
 def plain_result(term: Term, style: Style) -> Any:
-    """Return a value as a result: a pose as a Result, a number as a float, others as a mapping."""
+    """Convert a value to a result: a pose to a Result, a number to a float, others to a mapping."""
     type_, numbers = term.type, numbers_in(term, degrees=style.degrees)
     frame = {} if type_.target is None else {"frame": type_.target}
     if type_.kind == POSE:
@@ -183,7 +183,7 @@ def _cells(term: Term, style: Style) -> Any:
 
 
 def displayed(values: Iterable[tuple[Line, Term]]) -> Iterator[Term]:
-    """Yield the values of lines; a value that is bound to a name is only shown if it is the last."""
+    """Yield the values to print: those without a name, and that of the last line."""
     last = None
     for line, term in values:
         last = term if line.name else None
@@ -194,7 +194,7 @@ def displayed(values: Iterable[tuple[Line, Term]]) -> Iterator[Term]:
 
 
 def calculate_lines(stream: Task, scope: Scope) -> int:
-    """Write the value of each line of standard input.
+    """Write the value of each line of standard input, and return the exit status.
 
     Stops at the first error; with --on-error skip it continues after errors and returns 3.
     """
@@ -286,7 +286,7 @@ class CalcCommand(Command):
     """The command, whose arguments may be expressions that begin with a minus: -(..), -[..], -norm(..)."""
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
-        """Put a space before such arguments, which click would take for options."""
+        """Put a space before arguments that begin with a minus, which click would take for options."""
         shielded = []
         for each in args:
             behind = each[1:].lstrip("- ")
@@ -351,7 +351,7 @@ def calc_command(inputs: Inputs) -> int:
 def _over_rows(lines: Sequence[Line], behind: int, scope: Scope, task: Task) -> Request:
     """Return the request for rows: the results of -e, or of the last line, are written; other lines bind names.
 
-    behind: the number of lines before those of -e
+    behind: the number of lines that precede those of -e
     """
     from frametool.calc.rows import RowExpressions
     from frametool.rows.request import Operation, Timed

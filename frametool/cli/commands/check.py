@@ -160,7 +160,7 @@ def diff_command(inputs: Inputs) -> int:
     if output.style.format == "github":
         from frametool.formats.load import lines_of
 
-        # each at the line of the frame in B, or else in A
+        # each difference has the line of its frame in B, or else in A
         known = {each.frame: of_other.get(each.frame) or of_one.get(each.frame) for each in comparison.differences}
         placed = {frame: place for frame, place in known.items() if place is not None}
         where = dict(zip(placed, lines_of([*placed.values()]), strict=True))

@@ -49,7 +49,7 @@ def _read_offset(text: str) -> tuple[int | str, float | None]:
 
 
 def _read_limit(text: str) -> tuple[bool, int]:
-    """Parse `12.5` on the reference's clock, or `+5s` after the first pair: True and the time."""
+    """Parse `12.5`, on the reference's clock, or `+5s`, after the first pair: (False, ns) or (True, ns)."""
     return (True, options.read_span(text[1:])) if text.startswith("+") else (False, parse_stamp(text))
 
 
@@ -153,7 +153,7 @@ def compare_command(inputs: Inputs) -> int:
 
 
 def _write(output: Output, found: Sequence[Any], every: list[dict[str, Any]], rows: str | None) -> None:
-    """Write rows, a table, or the comparisons."""
+    """Write rows, a table of several comparisons, or the comparisons."""
     from frametool.fit.comparison import rows as rows_of
     from frametool.view.comparison_report import write_comparison, write_table
 
@@ -293,7 +293,10 @@ def trajectory(inputs: Inputs, argument: str, fmt: str = "", on_error: str = STO
 
 
 def comparisons(ref: str, ests: Sequence[str], inputs: Inputs) -> tuple[list[Comparison], bool]:
-    """Compare estimates with a reference by the options, with warnings; also return True if rows were skipped."""
+    """Compare estimates with a reference by the options, with warnings.
+
+    Also returns True if rows were skipped.
+    """
     from frametool.fit.comparison import EVO, SETTINGS, Settings, compared
 
     refuse_two_readers([ref, *ests])
@@ -337,7 +340,7 @@ def _mount(inputs: Inputs, text: str) -> Any:
 
 
 def write_trajectory(output: Output, found: Trajectory) -> None:
-    """Write poses, or positions, in any format that holds them; default names of frames are omitted."""
+    """Write poses, or positions, in any format that holds them; default frame names are omitted."""
     import numpy as np
 
     from frametool.frames.trajectory import BODY, WORLD

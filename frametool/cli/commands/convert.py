@@ -105,7 +105,7 @@ def convert_command(inputs: Inputs) -> int:
 
 
 def _source_of(values: Sequence[str], default: Notation | None, pose: Pose) -> Source:
-    """Return a source with the mapping of bare numbers; with `pose` if there are none, or for a heading."""
+    """Return the pose to derive as a mapping: bare numbers as written; for a heading or without numbers `pose`."""
     from frametool.documents.writers import dump_json
     from frametool.grammar.pasted import mapping_of_numbers
 
@@ -115,7 +115,7 @@ def _source_of(values: Sequence[str], default: Notation | None, pose: Pose) -> S
 
 
 def _are_numbers(values: Sequence[str], *, has_from: bool) -> bool:
-    """Return True for bare numbers, False for mappings and files; a single one is a number only with --from."""
+    """Return True for bare numbers, False for mappings and files; a single word is a number only with --from."""
     if not values or poses.is_inline(values[0]):
         return False
     with suppress(ValueInvalid):
@@ -153,7 +153,7 @@ def _change_of_axes(axes: str | None, world: str | None, both: str | None) -> tu
 
 
 def _named_change(axes: str | None, world: str | None, operation: Operation) -> OtherAxes | None:
-    """Return the change of axes for a derivation, None if there is none."""
+    """Return the change of axes for a derivation, None without one."""
     from frametool.explain.derive import OtherAxes
 
     left = (world, operation.left[3:]) if world and operation.left else None
@@ -164,7 +164,7 @@ def _named_change(axes: str | None, world: str | None, operation: Operation) -> 
 def _report_axes(
     axes: str | None, world: str | None, read_as: Notation | None, output: Output, *, is_anew: bool
 ) -> None:
-    """Report which axes changed and which did not, and where units and angles of engines differ from ours.
+    """Report which axes changed and which did not, and where units and angles of engines differ from frametool's.
 
     is_anew: the result is not a stream, so that positions can be written in the unit of the engine
     """

@@ -1,4 +1,4 @@
-"""Show what is shipped with the program: `help` on topics, commands and words, the cookbook, the example files."""
+"""Show what the package contains: `help` on topics, commands and words, the cookbook, the example files."""
 
 from __future__ import annotations
 
@@ -100,7 +100,7 @@ def _titles(label: str, titles: list[str], most: int = 12) -> str:
 
 
 def cookbook(words: tuple[str, ...]) -> str:
-    """Return the answers whose questions have these words, else answers that have them; without words all questions."""
+    """Return the answers whose questions have these words, else answers that have them; all questions without words."""
     known, holds = questions(), finder(words)
     if not words:
         return _titles("Questions of the cookbook (frametool help cookbook WORD shows them)", list(known), len(known))
@@ -124,7 +124,7 @@ def _commands(ctx: click.Context, names: Iterable[str] = COMMANDS) -> dict[str, 
 
 
 def _search(ctx: click.Context, name: str) -> str:
-    """Return the topics, commands, formats and questions with these words, those with them in the title first."""
+    """Return the topics, commands, formats and questions with these words; titles with the words come first."""
     known, recipes, holds = topics(), questions(), finder([name])
     for each in known:
         if holds(each) and abs(len(each) - len(name)) <= len("ies") - len("y"):  # the same, singular or plural
@@ -236,7 +236,7 @@ def help_command(ctx: click.Context, inputs: Inputs) -> None:
         from frametool.formats.trees.schema import schema
 
         text = f"{dump_json(schema())}\n"
-    elif name == "common":  # the options under a common heading, each as in the first command that has it
+    elif name == "common":  # options that are under another heading than `Options`, as in the first command with them
         first, found = shared.HEADINGS[0], dict[str, Any]()
         for command in _commands(ctx).values():
             shared_by_several = [each for each in command.params if getattr(each, "under", first) != first]

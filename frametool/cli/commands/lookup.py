@@ -40,7 +40,7 @@ class Skipped:
     """Times without a result: the first are reported, all are counted."""
 
     def __init__(self, *, in_json: bool) -> None:
-        """Start at 0; `in_json`: write errors as JSON."""
+        """Start at 0; in_json: write errors as JSON."""
         self.in_json, self.count = in_json, 0
         self.errors: list[FrametoolError] = []
 
@@ -62,7 +62,7 @@ class Skipped:
         return total.exit_code
 
 
-# columns of a table of lookups: what a row has, the heading in the help, excluded options
+# columns of a table of lookups: their content, heading in the help, excluded options
 _COLUMNS = (("TARGET", "Rows", ()), ("SOURCE", "Rows", ()), ("time", "Time", ("at",)))
 
 

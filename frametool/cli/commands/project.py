@@ -33,7 +33,7 @@ AXES = ("optical", "opengl", "flu")
 
 
 def _offer_cameras(_ctx: click.Context, incomplete: str) -> Mapping[str, str] | None:
-    """Offer the names of the cameras behind a file and its colon."""
+    """Offer the names of the cameras in a file, after its colon."""
     path, colon, _ = incomplete.rpartition(":")
     if not colon:
         return None
@@ -114,7 +114,7 @@ class CameraTask(Task):
     """The task of `project` or `unproject`: the camera, the transform of rows, the records."""
 
     def __init__(self, inputs: Inputs, output: Output, named: str) -> None:
-        """Read tree and camera; named: the names of the arguments up to the camera, if there is a tree."""
+        """Read tree and camera; named: the arguments up to the camera, for messages, if there is a tree."""
         super().__init__(inputs, output=output)
         holds_clouds = self.messages() is None and self.path and is_bag(self.path)  # of a bag, --topic is for records
         refuse(holds_clouds, f"write the clouds of {self.path} as files first: apply -o '{{stamp_ns}}.pcd'")
@@ -150,7 +150,7 @@ class CameraTask(Task):
         return self.camera.rectified(from_first=bool(inputs.from_first)) if inputs.rectified else self.camera
 
     def adding_request(self, formula: Formula, **fields: Any) -> Request:
-        """Return the request for rows to which the results of a formula are added."""
+        """Return the request that adds the results of a formula to rows."""
         self.inputs.use("keep")
         if self.mover is not None:
             return self.mover.request(formula, **fields)
@@ -256,7 +256,7 @@ class GroundMover(apply.TreeMover):
 def _columns(task: CameraTask, records: Sequence[Source]) -> Sequence[str]:
     """Return the columns or keys of u, v and, if present, depth or range; raises FormatError without u and v.
 
-    They are those of the first record, or else of the stream.
+    They are looked up in the first record, or else in the stream.
     """
     from frametool.rows.formulas import names_in
 

@@ -38,7 +38,7 @@ def _between(text: str) -> tuple[int, int]:
 
 
 def _refuse_change(place: str, *read: str) -> None:
-    """Refuse to write to a file that is read, to its folder, or into a folder that is read."""
+    """Raise FileProblem if the output is a file that is read, its folder, or inside a folder that is read."""
     new = Path(place).resolve()
     for each in filter(os.path.exists, read):
         old = Path(each).resolve()
@@ -48,7 +48,7 @@ def _refuse_change(place: str, *read: str) -> None:
 
 
 def _added_edges(inputs: Inputs, copy: str) -> Frames:
-    """Return the tree of --with; its joints need values, and covariances are left out."""
+    """Return the tree of --with, without covariances; raises BadAnswer for joints without a value."""
     edges = load_tree(inputs, inputs.more[0], inputs.more[1:])
     if resting := [name for *_, names in edges.robots for name in names]:
         raise BadAnswer(f"joints without a value would be static: {listing(resting)}; --joint NAME=VALUE gives it")

@@ -91,7 +91,7 @@ def _paced(start: float) -> Watch:
 
 
 def _pictures(scene: Scene, plot: str | None, view: str | None) -> dict[str, tuple[Watch, Callable[[], str | bytes]]]:
-    """Return for each file of a picture the function called with each step, and that which then returns its content."""
+    """Return for each picture's file a function that takes each step, and one that then returns the file's content."""
     found: dict[str, tuple[Watch, Callable[[], str | bytes]]] = {}
     if plot:
         from frametool.view.exports import run_picture
@@ -111,7 +111,7 @@ def _pictures(scene: Scene, plot: str | None, view: str | None) -> dict[str, tup
 def show_run(inputs: Inputs, scene: Scene, *, leaders: bool = False) -> None:
     """Run a scene to its end, write or draw it by the options, and write a summary to stderr.
 
-    Raises click.UsageError, FileProblem before anything runs; KeyboardInterrupt, if interrupted, after the summary.
+    Raises click.UsageError and FileProblem before anything runs; KeyboardInterrupt after the summary, if interrupted.
     """
     style, live, emit, reach = Output(inputs, "report").style, inputs.live, inputs.emit, inputs.reach
     plot, view, force = inputs.plot, inputs.view, inputs.force

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 NAMES = ("base", "gripper", "camera", "target")
 ROW_KEYS = ("place", "row", "id", "parent", "child", "distance", "angle", "u", "used", "checked", "fits")
-UNSURE = 1.2  # input sigmas that are too small by this factor are reported
+UNSURE = 1.2  # factor by which input sigmas must be too small to be reported
 
 
 def solved_tree(inputs: Inputs, files: Sequence[str], *, robust: bool) -> Solution:
@@ -61,7 +61,7 @@ def solved_tree(inputs: Inputs, files: Sequence[str], *, robust: bool) -> Soluti
         warn(f"the sigmas of the input are {found.sigma_factor:.2g} times too small for what the used rows are off")
     poses, exact = [], {name for name in found.frames if fixed and fixed.track(name)}
     for name in sorted(found.frames, key=lambda name: name != found.root):
-        track = found.tree.track(name)  # its parent is the root, or that in --fix
+        track = found.tree.track(name)  # its parent is the root, or its parent in --fix
         parent, pose = (track.parent, track.components) if track else (None, IDENTITY)
         poses.append(_pose(name, parent, pose, found.tree.covariances.get(name)))
     unknown = [str(each.name) for each in poses if each.parent and each.name not in exact and not each.covariance]
@@ -79,7 +79,7 @@ def _pose(name: str, parent: str | None, components: Iterable[Any], covariance: 
 
 
 def _side(parent: str, name: str, pose: Transform, covariance: Array | None) -> list[Pose]:
-    """Return a root and the pose of the one frame in it."""
+    """Return the pose of a frame in a root, after the entry of the root."""
     listed = None if covariance is None else covariance.ravel().tolist()
     return [_pose(parent, None, IDENTITY, None), _pose(name, parent, pose.components, listed)]
 
@@ -114,7 +114,7 @@ def _solution(
         "sigma": sigma and dict(zip(("xyz", "rpy"), sigma, strict=True)), "noise_at": of("noise_at"),
         "scale_sigma": of("scale_sigma"), "frames": frames, "measurements": rows,
     }  # fmt: skip
-    gone = of("left_out", ~found.used).tolist()  # without those of weight 0
+    gone = of("left_out", ~found.used).tolist()  # without rows of weight 0
     return Solution(numbers, poses, [*compress(rows, gone)], fixed, of("turns"))
 
 

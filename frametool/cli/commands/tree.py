@@ -185,7 +185,7 @@ def view_command(inputs: Inputs) -> None:
 
 
 def _scenes(inputs: Inputs, frames: Frames, *, overlay: bool) -> tuple[FrameScene, FrameScene | None]:
-    """Return the scene of a tree, and that of the tree from before for --overlay, in the same frame and at its time."""
+    """Return the scene of a tree and, for --overlay, that of the second tree in the same frame and at the same time."""
     from frametool.view.frame_scene import FrameScene
 
     ends = {} if overlay else {"target": inputs.target, "source": inputs.source}
@@ -241,7 +241,7 @@ def _content(
 
 
 def _solids(inputs: Inputs, tree: str) -> list[Solid]:
-    """Return the solids of a robot's file; report those that are not drawn, or as boxes."""
+    """Return the solids in a robot's file; report solids that are not drawn, and meshes, which are drawn as boxes."""
     from frametool.formats.robots.model import read_solids
 
     if not os.path.isfile(tree_file(tree)):
