@@ -116,7 +116,7 @@ def _inverted(text: str) -> re.Match[str] | None:
 
 
 def without_inverse(argument: str) -> tuple[str, bool]:
-    """Return an argument without `inv(..)` and `~`, and True if an odd number of them was removed.
+    """Return an argument without `inv(..)` and `~`, and True if its inverse is meant: two inverses cancel.
 
     Raises click.UsageError if no pose is left.
     """
