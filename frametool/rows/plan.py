@@ -116,7 +116,7 @@ def plan_table(table: Table, request: Request) -> tuple[Plan, Layout]:
         poses = [poses[0]._replace(position=position)]
     written = _columns(table, poses, shapes, targets, request, (parent, name), extra)
     if table.header:
-        refuse_repeated(written, names)
+        refuse_repeated(written, names, request)
     times = _stamp_columns(table, request, places, frames)
     pieces = () if request.results.all_numbers else pieces_of(written, table.width, table.delimiter)
     layout = Layout(tuple(written), places, frames, tuple(times), (parent, name))
@@ -405,16 +405,16 @@ def pieces_of(columns: Sequence[Column], width: int, delimiter: bytes) -> tuple[
     return tuple(pieces)
 
 
-def refuse_repeated(columns: Sequence[Column], names: Sequence[str]) -> None:
+def refuse_repeated(columns: Sequence[Column], names: Sequence[str], request: Request) -> None:
     """Raise Misused if a new column has the name of an unchanged column, or of another new one."""
     new = [column.name for column in columns if isinstance(column, New)]
-    kept = [names[column.place] for column in columns if not isinstance(column, New)]
     if len({*new}) < len(new):
         twice = sorted({name for name in new if new.count(name) > 1})
         if {*XYZ} <= {*twice}:
             hint = "a point with a weight: --columns x,y,z; a rotation: name it qx, qy, qz, qw"
             raise Misused(f"columns x, y, z, w are a quaternion, its position would have their names; {hint}")
         raise Misused(f"--to: columns {', '.join(twice)} would appear twice")
-    clash = sorted(set(new).intersection(kept))
-    if clash:
-        raise Misused(f"columns {', '.join(clash)} would appear twice; name the new ones with --prefix")
+    if clash := sorted({*new}.intersection(names[each.place] for each in columns if not isinstance(each, New))):
+        has_prefix = not request.results.all_numbers or request.operation.extras(Shape(POSE))
+        remedy = "name the new ones with --prefix" if has_prefix else "rename them in the input"
+        raise Misused(f"columns {', '.join(clash)} would appear twice; {remedy}")

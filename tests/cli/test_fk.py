@@ -162,6 +162,7 @@ def test_what_is_missing_or_wrong_is_named(
 def test_columns_that_are_there_are_not_written_again(run: Run) -> None:
     text = table(names=(*JOINTS, "x"), rows=[(*ROWS[0], 1.0)])
     assert "name the new ones with --prefix" in run(*FK, stdin=text).err
+    assert "columns x would appear twice; rename them in the input" in run(*FK, "-f", "json", stdin=text).err  # no --prefix
     assert run(*FK, "--prefix", "tool_", stdin=text).out.splitlines()[0].endswith(",tool_x,tool_y,tool_z,tool_qx,tool_qy,tool_qz,tool_qw")
     assert "key 'xyz' is there already" in run(*FK, stdin=json.dumps({**dict.fromkeys(JOINTS, 0), "xyz": [1, 2, 3]})).err
 
