@@ -52,6 +52,7 @@ MOST_LEAVES = 2000  # scalars of a record from which a template is learned: for 
 MOST_ENTRIES = 8  # points or poses of a record for which rows are made together
 SIX_BY_SIX = 36  # entries of the covariance of a pose
 SPELLED = ("yaml", "json", "csv")  # formats that preserve the names of other keys
+CUT = "some of its poses are beyond --start or --stop: what stays is written to another format, as -f csv"
 
 
 class Outside(FrametoolError):
@@ -228,7 +229,7 @@ class RecordText:
             with suppress(Outside):
                 found.append(answer(entry, self.values, self.request))
         if len(found) < len(self.entries) and (not found or not self.request.results.rewrite_records):
-            raise Outside("beyond --start or --stop")
+            raise ValueInvalid(CUT) if found else Outside("beyond --start or --stop")
         return found
 
     def starts(self, begin: int, answers: Sequence[Answer]) -> Iterator[int]:
@@ -481,8 +482,7 @@ def _rest(root: Node, record: Record) -> dict[str, Any]:
     """Return the other fields of a record and of the mappings around it, without pose, frames and header."""
     keys, used = record.keys, {"angles", "inverse", *PARTS.get(record.shape.kind, ())}
     used |= {keys.position, keys.rotation, *keys.others, *keys.flat, *keys.members, *keys.placed}
-    names = {*record.name.paths, *record.parent.paths}
-    rest: dict[str, Any] = {}
+    names, rest = {*record.name.paths, *record.parent.paths}, dict[str, Any]()
     for depth in range(len(_unit_of(record)), len(record.path) + 1):
         path = record.path[:depth]
         holder = root.at(path)

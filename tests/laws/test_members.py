@@ -166,3 +166,26 @@ def test_a_record_beyond_the_window_is_left_out_without_a_word(run: Run, into: s
     done = run("convert", "--start", "1.5", *form, stdin=text)
     assert (done.status, done.err) == (0, "")
     assert len(re.findall(r"\b2(?:\.0|000000000)\b", done.out)) == rows - 1
+
+
+@pytest.mark.parametrize("rows", [2, 100])
+def test_of_a_message_on_the_edge_of_the_window_all_or_what_is_within_is_told(run: Run, rows: int) -> None:
+    pose = {"position": {"x": 1, "y": 0, "z": 0}, "orientation": {"x": 0, "y": 0, "z": 0, "w": 1}}
+    stamps = [[at, at + 1] for at in range(rows)]
+    paths = [{"poses": [{"header": {"stamp": {"sec": sec, "nanosec": 0}}, "pose": pose} for sec in each]} for each in stamps]
+    window, text = ("convert", "--start", "1"), "".join(f"{json.dumps({'header': each['poses'][0]['header'], **each})}\n" for each in paths)
+    stopped, skipped, table = run(*window, stdin=text), run(*window, "--on-error", "skip", stdin=text), run(*window, "-f", "csv", stdin=text)
+    assert (stopped.status, skipped.status, skipped.out.count("\n"), table.status) == (1, 3, rows - 1, 0)
+    assert "stdin:1: some of its poses are beyond --start or --stop" in stopped.err
+    found = [int(line.rpartition(",")[2]) // 1_000_000_000 for line in table.out.splitlines()[1:]]
+    assert found == [sec for each in stamps for sec in each if sec >= 1]
+
+
+@pytest.mark.parametrize("rows", [3, 100])
+@pytest.mark.parametrize("dashes", ["--- ", "---\t", "---\n", "---\r\n"])
+def test_documents_may_begin_behind_their_dashes(run: Run, dashes: str, rows: int) -> None:
+    records = [f'{{"stamp": {at}, "xyz": [{at}, 5, {"no" if at == 1 else 3}], "rpy_deg": [0, 0, 90]}}\n' for at in range(rows)]
+    text = "".join(dashes + record for record in records)
+    done = run("convert", "--to", "rpy_deg", "--start", "1", "--on-error", "skip", stdin=text)
+    assert re.findall(f'^{dashes}{{"stamp": ([0-9]+)', done.out, re.MULTILINE) == [str(at) for at in range(2, rows)]
+    assert done.err.splitlines()[-1] == f"frametool: stdin: 1 of {rows} rows skipped"

@@ -50,7 +50,8 @@ DOCUMENTS, LINES, VALUES, ARRAY = "documents", "lines", "values", "array"
 MARK = b"\xef\xbb\xbf"
 MUCH = 1 << 20  # bytes of one unfinished value beyond which it is scanned again only at twice the size
 
-_SEPARATOR = re.compile(rb"^(?:---|\ttotal count: ?\d+---)[ \t]*\r?\n", re.MULTILINE)  # the last: ros2's note of a loss
+# a document may begin behind its dashes; the last is ros2's note of a loss
+_SEPARATOR = re.compile(rb"^(?:---(?=\s)[ \t]*(?:\r?\n)?|\ttotal count: ?\d+---[ \t]*\r?\n)", re.MULTILINE)
 _NO_DOCUMENT = re.compile(rb"(?:\xef\xbb\xbf)?(?:[ \t]*(?:#[^\n]*)?\r?(?:\n|\Z))*+(?:(?:\.\.\.|---)\s*)?")
 _LINE = re.compile(rb"[^\n]*\n|[^\n]+\Z")
 _SEVERAL = re.compile(rb"[}\]]\s*+(?:,\s*+)?+[{\[]|\}\s*+(?:,\s*+)?+[^\s,}\]]")

@@ -148,7 +148,7 @@ class Template:
     @cached_property
     def block_pattern(self) -> re.Pattern[bytes]:
         """Match a record with this layout where one may begin; its last group is the separator behind it."""
-        begin, end = rb"(?:\A|(?<=\n---\n)|(?<=\n---\r\n))", rb"(---[ \t]*\r?\n)"
+        begin, end = rb"(?:\A|(?<=\n---\n)|(?<=\n--- )|(?<=\n---\r\n))", rb"(---(?:[ \t]*\r?\n| (?=\S)))"
         if self.json:
             begin, end = rb"(?m:^)", rb"([ \t]*,?[ \t]*\r?\n)"
         return re.compile(begin + self.pattern.pattern + end)
@@ -337,8 +337,7 @@ class RecordCutter:
 
     def cut(self, text: bytes) -> tuple[list[Cut], list[tuple[int, int]]]:
         """Return the records of a block that match templates, and the rest of the block."""
-        cuts: list[Cut] = []
-        rest = [(0, len(text))]
+        cuts, rest = list[Cut](), [(0, len(text))]
         if not is_text(text):
             return cuts, rest
         for template in self.templates[-MOST_TRIED:][::-1]:
@@ -380,7 +379,9 @@ class RecordCutter:
         The template is remembered unless the record is long.
         """
         rewritten, in_order = known.request.results.rewrite_records, known.request.in_order
-        is_alike = self.left and not known.is_long and not (rewritten and len(known.entries) > MOST_ENTRIES)
+        is_split = known.request.window and len({entry.stamp for entry in known.entries}) > 1  # some may be beyond it
+        has_many = rewritten and len(known.entries) > MOST_ENTRIES
+        is_alike = self.left and not (known.is_long or is_split or has_many)
         if not known.entries or not (is_alike or in_order):
             return None
         self.left -= bool(is_alike)
