@@ -1,4 +1,4 @@
-"""Evaluate expressions: each part is checked once, in order; what depends on a row is computed later.
+"""Evaluate expressions: each part is checked once, in order; values that depend on a row are computed later.
 
 A scope holds the names of an expression; a literal in braces is a pose in the grammar that files share, or a point, a
 vector or a twist in the notation of results.
@@ -46,7 +46,7 @@ PLACED = {"point": (POINT, AXES), "vector": (VECTOR, AXES), "twist": (TWIST, ("v
 
 
 def literal(value: Any, reading: Reading) -> Term:
-    """Read a pose, or a point, a vector or a twist in the notation of results; raises Misfit."""
+    """Convert a pose, or a point, a vector or a twist in the notation of results, to a term; raises Misfit."""
     if type(value) is not dict:
         raise Misfit(f"expected a pose like {{xyz: [x, y, z], rpy_deg: [..]}}, found {kind(value)}")
     key = next((key for key in PLACED if key in value), "")
@@ -66,12 +66,12 @@ def literal(value: Any, reading: Reading) -> Term:
 
 
 def term_of_pose(pose: Pose) -> Term:
-    """Return the value of a pose with or without frame names."""
+    """Return the term of a pose with or without frame names."""
     return Term(Type(POSE, pose.parent, pose.name), pose.components)
 
 
 class Scope:
-    """The names available to an expression: values, trees, the default tree, the row of a stream.
+    """The names that an expression can use: values, trees, the default tree, the row of a stream.
 
     names: of values and trees; extended by assignments
     row: the type of a row; None outside of streams
@@ -101,7 +101,7 @@ class Scope:
             warn(message)
 
     def reading(self, source: Source) -> Reading:
-        """Return how the literals of a text are read."""
+        """Return the options for reading the literals of a text."""
         return Reading(source, degrees=self.degrees, normalize=self.normalize, earth=self.earth)
 
     @property
@@ -123,7 +123,7 @@ def pointed(error: FrametoolError, text: str) -> FrametoolError:
 
 @contextmanager
 def located(at: int) -> Iterator[None]:
-    """Add the position in the expression to an error without one."""
+    """Add the position in the expression to an error that has no position."""
     try:
         yield
     except FrametoolError as error:
@@ -133,7 +133,7 @@ def located(at: int) -> Iterator[None]:
 
 
 def read_line(text: str) -> Line:
-    """Parse a line; errors point into it."""
+    """Parse a line; raises CalcError with the line and a caret below the position."""
     try:
         return parse_line(text, FUNCTIONS)
     except CalcError as error:
@@ -141,7 +141,7 @@ def read_line(text: str) -> Line:
 
 
 def evaluate_line(line: Line, scope: Scope) -> Term:
-    """Return the value of a parsed line, assign it to its name, if any, and to `ans`; errors point into the line."""
+    """Evaluate a parsed line; bind the value to its name, if any, and to `ans`; errors show the line with a caret."""
     try:
         term = _Walk(scope).term(line.tree)
     except FrametoolError as error:
@@ -159,7 +159,7 @@ class _Walk:
         self.scope = scope
 
     def term(self, branch: Branch) -> Term:
-        """Return the value of a part; an error has the position."""
+        """Return the value of a part; errors get its position."""
         with located(branch.at):
             found: Term = getattr(self, f"_{branch.kind}")(branch)
         self.scope.seen.update((found.type.target, found.type.source))
@@ -255,7 +255,7 @@ class _Walk:
         return functions.called("negate", [self._value(branch.parts[0])])
 
     def _framed(self, term: Term, frames: Sequence[str]) -> Term:
-        """Name both frames of a pose, or the frame of a point, a vector, a twist or angles."""
+        """Set both frames of a pose, or the frame of another value; raises CalcError if other frames are known."""
         type_ = term.type
         if type_.kind not in ((POSE,) if len(frames) == 2 else functions.FRAMED):
             takes = ".. in FRAME names the frame of a point or vector, .. as TARGET<-SOURCE the two of a pose"
@@ -289,20 +289,20 @@ class _Walk:
         if when != "row":
             return Term(type_, tree.lookup_components(target, source, None if when == "latest" else when))
         self._row("@ row")
-        tree.latest(target, source)  # raises errors that do not depend on the time
+        tree.latest(target, source)  # raises the errors that do not depend on the time
 
         def at_row(row: RowValues) -> Components:
             """Look up at the times of rows; rows without data are nan."""
             if row.xp is not floats:
                 return tree.lookup_many(target, source, row.times_ns, missing="nan").components
-            found = tree.lookup_many(target, source, [row.times_ns], missing="nan").components  # the bits of many
+            found = tree.lookup_many(target, source, [row.times_ns], missing="nan").components  # same bits as for many
             single = tuple(float(column[0]) for column in found)
             return single if single[6] == single[6] else tree.lookup_components(target, source, row.times_ns)
 
         return Term(type_, None, at_row)
 
     def _tree(self, name: str) -> Frames:
-        """Find the tree of a look-up."""
+        """Return the tree of a look-up; raises NoTree or CalcError."""
         scope = self.scope
         if not name:
             if scope.tree is None:
@@ -324,7 +324,10 @@ WORDS = ("row", "pi", "ans", "as ", "in ")
 
 
 def completions(scope: Scope, text: str, before: str) -> list[str]:
-    """Return what a word after the rest of a line may become: frames on both sides of an arrow, names, functions."""
+    """Return the completions of the last word of a line: frames on both sides of an arrow, names, functions.
+
+    text: the word; before: the line before it
+    """
     opened = re.search(r"(\w+) *\[$", before)  # the bracket of a named tree
     asked = scope.names[opened[1]].tree if opened and opened[1] in scope.names else None
     tree = asked or scope.tree
@@ -438,7 +441,7 @@ def calc(
 
 
 def _result(term: Term) -> Any:
-    """Return the Python value of a term."""
+    """Convert a term to its Python value."""
     if term.type.kind == TREE:
         return term.tree
     if term.type.kind == LIST:
@@ -450,7 +453,10 @@ def _result(term: Term) -> Any:
 
 
 def term_of(name: str, value: Any) -> Term:
-    """Convert a Python value; of arrays (..., 3) is points, (..., 6) twists, others numbers."""
+    """Convert a Python value to a term; arrays (..., 3) are points, (..., 6) twists, others numbers.
+
+    Raises ValueInvalid for other values.
+    """
     if isinstance(value, Framed):
         found = value._term  # noqa: SLF001 - its own module
     elif isinstance(value, Frames):

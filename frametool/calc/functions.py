@@ -1,9 +1,9 @@
-"""The values of expressions, and what operators and functions do with them.
+"""The values of expressions, and the operators and functions on them.
 
 A value has a kind, frames, a unit, and its numbers, or the function that computes them.  An unknown frame is None,
-shown as `?`, and matches any.  Numbers are components, floats or arrays of one shape.  Operators and functions are
-tables of what each takes, how frames and units meet, and the kernel.  An angle in degrees stays in degrees where that
-is exact: in sums, and in sine and cosine.
+shown as `?`, and matches any.  Numbers are components, floats or arrays of one shape.  Tables list, for each operator
+and function, the kinds of its arguments, the rule for their frames and units, and the kernel.  An angle in degrees
+remains in degrees where that is exact: in sums, and in sine and cosine.
 """
 
 from __future__ import annotations
@@ -33,11 +33,11 @@ FRAMED = (POINT, VECTOR, TWIST, ANGLES)  # kinds with one frame
 
 
 class Type(NamedTuple):
-    """What is known of a value without its numbers.
+    """The kind, frames and unit of a value.
 
-    target, source: the frames of a pose; a point, vector, twist or angles are in `target`
-    unit: that of a number: m, rad, s or none
-    degrees: of an angle whose number is in degrees, so that right angles are exact
+    target, source: the frames of a pose; a point, vector, twist or angles are expressed in `target`
+    unit: that of a number: m, rad, s or ""
+    degrees: True for an angle whose number is in degrees, so that right angles are exact
     """
 
     kind: str
@@ -67,9 +67,11 @@ PLAIN_NUMBER = Type(NUMBER)
 
 
 class RowValues(NamedTuple):
-    """One row, or a block of rows: its pose, point or vector, the used columns, its time, and the functions.
+    """One row, or a block of rows.
 
-    bound: the values of names by the id of the function that computes them, so that each is computed once
+    parts: its pose, point or vector; cells: the used columns by name; times_ns: its time; xp: the namespace of
+        functions
+    bound: id of the function that computes a name's value -> value, so that each is computed once
     """
 
     parts: Components
@@ -82,7 +84,7 @@ class RowValues(NamedTuple):
 class Term(NamedTuple):
     """An evaluated part of an expression: its type, and its numbers, or the function that computes them from a row.
 
-    parts: None if they depend on a row; items: those of a list; tree: for look-ups
+    parts: the numbers, None if they depend on a row; items: the values of a list; tree: for look-ups
     text: as written
     """
 
@@ -106,7 +108,7 @@ def made(type_: Type, kernel: Kernel, *operands: Term, check: Check | None = Non
     """Return the result of a kernel for the numbers of all operands: at once if they are known, else for each row.
 
     kernel: takes the numbers, then the namespace with their functions
-    check: returns the reason why floats have no result, if there is one, or raises it
+    check: returns the reason why floats have no result, "" if they have one; or raises an error
     """
 
     def computed(row: RowValues | None) -> Components:
@@ -154,12 +156,12 @@ def _of_arrays(kernel: Kernel, numbers: Components, check: Check | None) -> Comp
 
 
 def meet(a: str | None, b: str | None) -> bool:
-    """Return True if two frames may be the same."""
+    """Return True if two frames are the same, or may be because one is unknown."""
     return a is None or b is None or a == b or (a in EARTH_FRAMES and b in EARTH_FRAMES)
 
 
 def wanted(term: Term) -> Term:
-    """Refuse a tree or a list where one value is expected."""
+    """Return a term unchanged; raises CalcError for a tree or a list."""
     if term.type.kind == TREE:
         raise CalcError(f"{term.text} is a tree; ask it: {term.text}[TARGET<-SOURCE]")
     if term.type.kind == LIST:
@@ -168,7 +170,7 @@ def wanted(term: Term) -> Term:
 
 
 TO_RADIANS = 0.017453292519943295
-# the words of a rule that are no kinds
+# word in a rule other than a kind -> predicate
 FITS: dict[str, Callable[[Term], bool]] = {
     "placed": lambda term: term.type.kind in (POINT, VECTOR),
     "free": lambda term: term.type.kind == POINT and term.type.target is None,
@@ -179,20 +181,20 @@ FITS: dict[str, Callable[[Term], bool]] = {
     "1": lambda term: _constant(term) == 1.0,
     "-1": lambda term: _constant(term) == -1.0,
 }
-UNIT_OF = {"plain": PLAIN, "length": METRE, "angle": RADIAN}  # of results
+UNIT_OF = {"plain": PLAIN, "length": METRE, "angle": RADIAN}  # word for the result in a rule -> unit
 
 
 def _constant(term: Term) -> Number | None:
-    """Return a plain number that is the same in all rows."""
+    """Return the number of a plain number that is the same in all rows; None for other terms."""
     return term.parts[0] if term.type == PLAIN_NUMBER and term.parts and single(term.parts) else None
 
 
 class Overload(NamedTuple):
-    """One meaning of an operator or function: a rule for kinds, frames and units, and the kernel.
+    """One signature of an operator or function: a rule for kinds, frames and units, and the kernel.
 
     rule: `pose.ab pose.bc -> pose.ac`, a kind or a word of FITS for each argument with letters for its frames, target
         first, or for the unit of a number; equal letters must be the same frame or unit; `..` repeats the only argument
-    check: returns the reason why floats have no result, if there is one, or raises it
+    check: returns the reason why floats have no result, "" if they have one; or raises an error
     """
 
     rule: str
@@ -200,7 +202,7 @@ class Overload(NamedTuple):
     check: Check | None = None
 
     def result(self, sign: str, terms: Sequence[Term]) -> Term | None:
-        """Return the result; None if the arguments are of other kinds; raises CalcError if frames do not match."""
+        """Return the result; None if kinds or units do not fit; raises CalcError if frames do not match."""
         takes, gives = self.rule.split(" -> ")
         words = takes.split()
         words = words[:1] * len(terms) if words[-1] == ".." else words
@@ -254,7 +256,7 @@ def in_radians(term: Term) -> Term:
 
 
 def numbers_in(term: Term, row: RowValues | None = None, *, degrees: bool = False) -> Components:
-    """Return the numbers of a value, angles in degrees or radians; one written in degrees is exact."""
+    """Return the numbers of a value, angles in degrees or radians; an angle written in degrees is exact in degrees."""
     is_angle = degrees and (term.type.kind == ANGLES or term.type.unit == RADIAN)
     if is_angle and term.type.degrees:
         return term.at(row)
@@ -266,7 +268,7 @@ def numbers_in(term: Term, row: RowValues | None = None, *, degrees: bool = Fals
 
 
 def plain(kernel: Callable[..., Components]) -> Kernel:
-    """Return the kernel of arithmetic that needs no namespace."""
+    """Return a kernel that ignores the namespace."""
     return lambda *numbers: kernel(*numbers[:-1])
 
 
@@ -300,7 +302,7 @@ def unit_pose(*parts: Number) -> Rigid:
 
 
 def _of_unit(kernel: Callable[..., Components]) -> Kernel:
-    """Return a kernel of one pose that normalises it first."""
+    """Return a kernel that normalises the quaternion of its pose first."""
     return lambda *pose: kernel(*unit_pose(*pose), pose[-1])
 
 
@@ -355,7 +357,7 @@ def _power(base: Number, exponent: Number, xp: Namespace) -> Components:
 
 
 def _leg(value: Number, xp: Namespace) -> Number:
-    """Return the other leg of a right triangle with a hypotenuse of 1."""
+    """Return sqrt(1 - value^2)."""
     return xp.sqrt((1.0 - value) * (1.0 + value))
 
 
@@ -379,11 +381,11 @@ def _within(name: str, least: float, most: float, words: str) -> Check:
 # --- the tables ---
 
 
-# what a sum and a difference share
+# rules common to sums and differences
 SUMS = [f"{each} {each} -> {each}" for each in ("number.u", "vector.a", "twist.a")] + ["point.a vector.a -> point.a"]
 
 
-# operator -> what cannot be done, its meanings
+# operator -> message if no overload fits, overloads
 OPERATORS: dict[str, tuple[str, Sequence[Overload]]] = {
     "*": ("multiply {} by {}", [
         Overload("pose.ab pose.bc -> pose.ac", plain(rigid.compose)),
@@ -419,14 +421,14 @@ OPERATORS: dict[str, tuple[str, Sequence[Overload]]] = {
 
 
 def _angular(pick: Callable[[Number, Number], Number]) -> list[Overload]:
-    """Return the meanings of a function of an angle, from its sine and cosine; exact at quarter turns in degrees."""
+    """Return the overloads of a function of an angle, from its sine and cosine; exact at quarter turns in degrees."""
     return [
         Overload("degrees -> plain", lambda value, xp: (pick(*floats.half_sincos_deg(2.0 * value, xp)),)),
         Overload("angle -> plain", lambda value, xp: (pick(*floats.half_sincos(2.0 * value, xp)),)),
     ]
 
 
-# function -> what it takes, its meanings
+# function -> description of its arguments, overloads
 FUNCTIONS: dict[str, tuple[str, Sequence[Overload]]] = {
     "inv": ("a pose", [Overload("pose.ab -> pose.ba", plain(rigid.inverse))]),
     "trans": ("a pose", [Overload("pose.ab -> point.a", lambda *pose: pose[:3])]),
@@ -484,7 +486,7 @@ FUNCTIONS: dict[str, tuple[str, Sequence[Overload]]] = {
 def called(name: str, terms: Sequence[Term]) -> Term:
     """Return the result of an operator or a function; raises CalcError."""
     takes, overloads = FUNCTIONS.get(name) or OPERATORS[name]
-    for each in overloads:  # the first that suits the arguments
+    for each in overloads:  # the first that fits the arguments
         if (found := each.result(name, terms)) is not None:
             return found
     types = [term.type.named for term in terms]

@@ -26,13 +26,13 @@ LONGEST = 1 << 16  # characters of an expression
 DEEPEST = 100  # levels of nested brackets, signs and exponents
 RESERVED = ("row", "as", "in", "ans", "pi")
 PLAIN, METRE, RADIAN, SECOND = "", "m", "rad", "s"
-# per base unit, as a multiple or a divisor: dividing rounds once, so that 100mm is 0.1m
+# unit -> factor, divisor and base unit: dividing rounds once, so that 100mm is 0.1m
 UNITS: dict[str, tuple[float, float, str]] = {
     "m": (1.0, 1.0, METRE), "mm": (1.0, 1e3, METRE), "cm": (1.0, 1e2, METRE), "km": (1e3, 1.0, METRE),
     "rad": (1.0, 1.0, RADIAN), "deg": (1.0, 1.0, RADIAN),
     "s": (1.0, 1.0, SECOND), "ms": (1.0, 1e3, SECOND), "us": (1.0, 1e6, SECOND), "ns": (1.0, 1e9, SECOND),
 }  # fmt: skip
-# how tightly operators and the words for frames bind the value before them; signs bind it after them
+# precedence of operators and of the words for frames; SIGN is that of a sign before its value
 LOOSEST, SIGN, FRAMES = 0, 2, 4
 BINDING = {"+": LOOSEST, "-": LOOSEST, "*": 1, "/": 1, "^": 3, "as": FRAMES, "in": FRAMES}
 _FRAME = r'(?:"[^"\n]*+"|/?+[^\W\d](?:[\w/:.]|-(?!-*+[<>]))*+)'
@@ -82,7 +82,7 @@ class Token(NamedTuple):
 
 
 def tokens_of(text: str) -> list[Token]:
-    """Split an expression into tokens; the last one is the end.  A frame follows `in`."""
+    """Split an expression into tokens, the last of which is the end; the token after `in` is a frame."""
     if len(text) > LONGEST:
         raise CalcError(f"an expression of {len(text)} characters; the most are {LONGEST}")
     tokens: list[Token] = []
@@ -125,7 +125,7 @@ class Branch(NamedTuple):
 
     kind: number, lookup, name, column, call, pose, list, chain, negate
     at: the position for messages about it
-    value: its data apart from its parts, by kind; parts: its children in order
+    value: its data, by kind; parts: its children in order
     """
 
     kind: str
@@ -135,7 +135,7 @@ class Branch(NamedTuple):
 
 
 class Operator(NamedTuple):
-    """An operator of a chain, or `as` or `in` with the frames that they name, and its position."""
+    """An operator of a chain, or the word `as` or `in` with the frames after it; at: its position."""
 
     text: str
     at: int
@@ -143,7 +143,7 @@ class Operator(NamedTuple):
 
 
 class Line(NamedTuple):
-    """A line: the name that it assigns, if any, and its expression with the whole text."""
+    """A line: the name that it assigns ("" if none), its expression, and the whole text."""
 
     name: str
     tree: Branch
@@ -151,7 +151,7 @@ class Line(NamedTuple):
 
 
 def parse_line(text: str, taken: Container[str]) -> Line:
-    """Parse `NAME = expression` or an expression; `taken` are reserved names."""
+    """Parse `NAME = expression` or an expression; taken: names that cannot be assigned."""
     head, equals, _ = text.partition("=")
     name = head.strip() if equals else ""
     if not name.isidentifier():
@@ -172,17 +172,17 @@ def walk(tree: Branch) -> Iterator[Branch]:
 
 
 def needs_time(branch: Branch) -> bool:
-    """Return True for a look-up at the time of the row."""
+    """Return True for a look-up at the time of the row, `@ row`."""
     return branch.kind == "lookup" and branch.value[2] == "row"
 
 
 def reads_row(branch: Branch) -> bool:
-    """Return True for the row's own pose, point or vector."""
+    """Return True for the name `row`."""
     return branch.kind == "name" and branch.value == "row"
 
 
 def mentions_row(tree: Branch) -> bool:
-    """Return True if an expression needs rows: `row`, `row.COLUMN`, `@ row`."""
+    """Return True if an expression needs rows: it has `row`, `row.COLUMN` or `@ row`."""
     return any(each.kind == "column" or reads_row(each) or needs_time(each) for each in walk(tree))
 
 
@@ -208,7 +208,7 @@ class _Parser:
         return self.next.kind == "op" and self.next.text in texts
 
     def expect(self, text: str) -> Token:
-        """Take an operator, or raise an error that it is missing."""
+        """Take an operator; raises CalcError if another token is next."""
         if self.has(text):
             return self.take()
         found = f", found {shown(self.next.text)}" if self.next.kind != "end" else " here"
@@ -222,14 +222,14 @@ class _Parser:
         return tree
 
     def _hint(self) -> str:
-        """Return how a unit is written that stands apart from its number."""
+        """Return a hint if a unit is separated from its number, else ""."""
         token, before = self.next, self.tokens[self.index - 1] if self.index else None
         if before is not None and before.kind == "number" and not before.unit and token.text in UNITS:
             return f"; write a unit directly after its number: {before.text}{token.text}"
         return ""
 
     def deeper(self, at: int, least: int = LOOSEST) -> Branch:
-        """Parse a value one level further in."""
+        """Parse a nested value; raises CalcError beyond DEEPEST levels."""
         self.depth += 1
         if self.depth > DEEPEST:
             raise CalcError(f"nested deeper than {DEEPEST} levels", at)
@@ -238,7 +238,7 @@ class _Parser:
         return found
 
     def value(self, least: int = LOOSEST) -> Branch:
-        """Parse a value, and the operators behind it that bind at least so tightly, as one chain from left to right."""
+        """Parse a value, and the operators after it with at least this precedence, as one chain from left to right."""
         if self.has("-", "+"):
             sign = self.take()
             first = self.deeper(sign.start, SIGN)
@@ -297,7 +297,7 @@ class _Parser:
         raise CalcError(f"unexpected {shown(text)}{hint}", start)
 
     def _items(self, close: str, start: int) -> tuple[tuple[Branch, ...], int]:
-        """Parse values separated by commas up to a bracket; return them and the end."""
+        """Parse values separated by commas up to a closing bracket; return them and the position after it."""
         items = []
         if not self.has(close):
             items.append(self.deeper(start))
@@ -307,7 +307,7 @@ class _Parser:
         return tuple(items), self.expect(close).end
 
     def _lookup(self, token: Token, tree: str) -> Branch:
-        """Parse the time of a look-up as nanoseconds, never through a float, or as one of the words."""
+        """Parse the time of a look-up: nanoseconds, never through a float, or `latest` or `row`."""
         when: int | str | None = None
         if self.has("@"):
             self.take()

@@ -39,7 +39,10 @@ SOME, OTHER = "\0some", "\0other"
 
 
 class Bound(NamedTuple):
-    """Lines evaluated for rows of one type: the results by name, the names of their numbers, all their frames."""
+    """Lines evaluated for rows of one type.
+
+    terms: (name, result) of each line; extras: the names of the numbers that are added; frames: of all values
+    """
 
     terms: tuple[tuple[str, Term], ...]
     extras: tuple[str, ...]
@@ -66,7 +69,7 @@ class RowExpressions(Formula):
         self._bound: dict[Type, Bound] = {}
 
     def check(self, kinds: Sequence[str]) -> None:
-        """Raise the first error if the lines suit none of several kinds of rows."""
+        """Raise the first error if the lines fit none of several kinds of rows."""
         problems = []
         for kind in kinds if self.reads_row else ("",):
             try:
@@ -78,18 +81,18 @@ class RowExpressions(Formula):
         raise problems[0]
 
     def kind(self, row: str) -> str:
-        """Return whether a row of some kind becomes a pose, a point or a vector; "" for numbers alone."""
+        """Return the kind of the result for rows of a kind: pose, point or vector; "" for numbers."""
         if self.adds:
             return ""
         kind = self._for(Type(row)).terms[0][1].type.kind
         return kind if kind in (POSE, POINT, VECTOR) else ""
 
     def extras(self, row: str) -> tuple[str, ...]:
-        """Return the names of the numbers in addition to a pose or point."""
+        """Return the names of the numbers that are added to rows of a kind."""
         return self._for(Type(row)).extras
 
     def rename(self, row: str, parent: str | None, name: str | None) -> tuple[str | None, str | None]:
-        """Return the frames of the result of a row with these frames; raise CalcError if the expressions do not fit."""
+        """Return the frames of the result for a row with these frames; raises CalcError if they do not fit."""
         known = self._for(Type(row)).frames
         first = parent if parent in known else SOME
         second = name if name in known else SOME if name == parent else OTHER
@@ -109,16 +112,16 @@ class RowExpressions(Formula):
     def result(
         self, row: str, parts: Components, cells: Sequence[Number], times_ns: Number, xp: Namespace
     ) -> Components:
-        """Return the components of the result and then the extras; for floats raises CalcError if there are none."""
+        """Return the components of the result and then the extras; raises CalcError if floats have no result."""
         bound = self._for(Type(row))
         values = RowValues(parts, dict(zip(self.columns, cells, strict=True)), times_ns, xp, {})
         if self.kind(row):
             return bound.terms[0][1].at(values)
         numbers = [number for _, term in bound.terms for number in self._numbers(term, values)]
-        return (*(0.0,) * 7, *numbers)  # an unchanged row: its own pose is not replaced
+        return (*(0.0,) * 7, *numbers)  # the pose of the row is not replaced
 
     def _for(self, type_: Type) -> Bound:
-        """Evaluate the lines for rows of a type."""
+        """Return the lines evaluated for rows of a type, from a cache."""
         if type_ not in self._bound:
             self._bound[type_] = self._bind_all(type_)
         return self._bound[type_]
@@ -134,7 +137,7 @@ class RowExpressions(Formula):
         return Bound(terms, extras, frozenset(scope.seen))
 
     def _bind(self, line: Line, scope: Scope) -> Term:
-        """Evaluate a line; the value of a name is computed once per block however often it is used."""
+        """Evaluate a line; the value of a name is computed once per block, however often it is used."""
         term = evaluate_line(line, scope)
         compute = term.compute
         if not line.name:
@@ -170,7 +173,7 @@ class RowExpressions(Formula):
 
 
 def poses_of_table(path: str, fmt: str, *, normalize: bool, degrees: bool) -> Term:
-    """Return the poses or points of a table as a list; raises FormatError at the first bad row."""
+    """Read the poses or points of a table as a list; raises FormatError at the first bad row."""
     with opened(path) as stream:
         numbers = samples_of(stream, fmt, RowOptions(normalize=normalize, degrees=degrees), BadRows(path)).numbers
     is_turned = not np.isnan(numbers[0, -1])

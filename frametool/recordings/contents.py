@@ -1,4 +1,4 @@
-"""The contents of a recording's messages: transforms as edges, clouds as numpy records, everything else as JSON lines.
+"""The contents of a recording's messages: transforms as edges, clouds as numpy records, other types as JSON lines.
 
 Points, poses, fixes, twists, wrenches and the like are a stream of JSON lines, one per message.  Transforms are read
 from every topic that has any; those on a topic `tf_static` are static.  Points of clouds are not copied.
@@ -40,16 +40,16 @@ if TYPE_CHECKING:
 
 CLOUD, POSE_ARRAY = "sensor_msgs/msg/PointCloud2", "geometry_msgs/msg/PoseArray"
 DATATYPES = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 8: "f8"}
-MOST_VALUES = 1 << 16  # per field
+MOST_VALUES = 1 << 16  # values of a field
 
 
 class PointCloud(NamedTuple):
     """The points of one message.
 
     number: of the message among those of its topics, from 1
-    frame: that of its header, "" for none
+    frame: that of its header, "" for no frame
     names: of the columns; rows: (n,) records with the fields 0, 1, .. in their order
-    width, height: n is their product
+    width, height: of the grid; n is their product
     """
 
     number: int
@@ -73,7 +73,7 @@ def cloud_topics(reader: RecordingReader, chosen: Collection[str]) -> list[str]:
 def _of_one_topic(
     reader: RecordingReader, types: Collection[str], chosen: Collection[str], what: str
 ) -> list[Channel]:  # fmt: skip
-    """Return the channels of some types on the chosen topics, or on the only one."""
+    """Return the channels of some types on the chosen topics, or on the only topic with them."""
     found = reader.on_topics(types, chosen)
     topics = sorted({each.topic for each in found})
     if len(topics) > 1 and not chosen:
@@ -84,7 +84,7 @@ def _of_one_topic(
 
 
 def _nothing(reader: RecordingReader, what: str, chosen: Collection[str] = ()) -> FormatError:
-    """Return the error that nothing of a kind is on the chosen topics, or on any."""
+    """Return the error that no messages of a kind are on the chosen topics, or on any topic."""
     named = f" on {listing(chosen)}" if chosen else ""
     known = listing({f"{each.topic} ({each.type})" for each in reader.all}, near=next(iter(chosen), ""))
     remedy = f"; its frames: frametool lookup {reader.path} TARGET SOURCE" if reader.on_topics(TYPES) else ""
@@ -110,7 +110,7 @@ def _cloud(message: Any, number: int, topic: str, tally: Diagnostics) -> PointCl
     names, kind = _record_of(message)
     width, height = int(message.width), int(message.height)
     data, least = np.asarray(message.data, np.uint8), width * kind.itemsize
-    row = int(message.row_step) or least  # of a grid may be padded
+    row = int(message.row_step) or least  # rows of a grid may be padded
     needed = (height - 1) * row + least if width and height else 0
     if needed > len(data) or (height > 1 and row < least):
         points = f"{width} x {height} points of {kind.itemsize} bytes"
@@ -126,7 +126,7 @@ def _cloud(message: Any, number: int, topic: str, tally: Diagnostics) -> PointCl
 
 
 def _record_of(message: Any) -> tuple[tuple[str, ...], np.dtype[Any]]:
-    """Return the columns of a point, and its type: each value of a field is a column."""
+    """Return the names of a point's columns, and the type of a point; each value of a field is a column."""
     order, step = ">" if message.is_bigendian else "<", int(message.point_step)
     columns: dict[str, tuple[str, int]] = {}
     for field in message.fields:
@@ -160,7 +160,7 @@ RECORDS = frozenset((
 def open_records(path: str, chosen: Collection[str], tally: Diagnostics) -> BufferedReader | None:
     """Open the messages of a bag as JSON lines: those of the chosen topics, with or without a leading `/`.
 
-    None if the chosen topics have clouds.
+    Returns None if the chosen topics have only clouds.
     Raises FileProblem when the extra is missing, Unanswered if several topics have records and none is chosen,
     FormatError for a bag that is broken or has neither.
     """
@@ -173,9 +173,9 @@ def open_records(path: str, chosen: Collection[str], tally: Diagnostics) -> Buff
 
 
 def open_trajectory(path: str, chosen: Collection[str], tally: Diagnostics) -> tuple[BufferedReader, str] | None:
-    """Open the poses of the chosen topic, or of the only moving one, as JSON lines; return the topic too.
+    """Open the poses of the chosen topic, or of the only topic with poses, as JSON lines; return the topic too.
 
-    None for other topics, and if no topic was chosen and there are transforms too.
+    None unless there is exactly one such topic, and if the (chosen) topics have transforms too.
     """
     with ExitStack() as opened:
         reader = opened.enter_context(opened_recording(path, tally))
@@ -186,7 +186,10 @@ def open_trajectory(path: str, chosen: Collection[str], tally: Diagnostics) -> t
 
 
 def _pieces(reader: RecordingReader, channels: Sequence[Channel]) -> Iterator[bytes]:
-    """Yield the messages, or the poses of lists, as lines, many together; an error follows the lines before it."""
+    """Yield the messages as lines of JSON, a list of poses as a line for each, in blocks of lines.
+
+    Raises FormatError after the lines before a broken message.
+    """
     number = 1
     try:
         for stretch in reader.blocks(channels):
@@ -209,7 +212,7 @@ def _pieces(reader: RecordingReader, channels: Sequence[Channel]) -> Iterator[by
 
 
 def posed_messages(message: Any, kind: str) -> list[Any]:
-    """Return the poses of a message that is a list of them, each with its header; else the message itself.
+    """Return the poses of a PoseArray or a Path, each with a header; else a list with the message itself.
 
     A pose of a Path has its own header; a missing frame or stamp is that of the path.  A stamp of 0 with a frame is
     a valid time if other poses have stamps.
@@ -235,7 +238,7 @@ def text_of(types: MessageTypes, channel: Channel, data: bytes) -> bytes:
 
 
 def _plain(value: Any) -> Any:
-    """Return a message, or a part of one, as plain values; numbers that JSON does not have are written by name."""
+    """Convert a message, or a part of one, to plain values; numbers that JSON lacks are written by name."""
     if isinstance(value, float):
         return value if isfinite(value) else str(value)
     if isinstance(value, np.ndarray):
@@ -249,8 +252,8 @@ def _plain(value: Any) -> Any:
 
 CODES = {"float64": "<f8", "float32": "<f4", "uint32": "<u4", "int32": "<i4", "uint16": "<u2", "int16": "<i2",
          "uint8": "<u1", "int8": "<i1"}  # fmt: skip
-MOST_NUMBERS = 200  # per message
-MOST_LAYOUTS = 16  # of messages of one length
+MOST_NUMBERS = 200  # in a message that is read fast
+MOST_LAYOUTS = 16  # layouts tried for messages of one channel and length
 CDR_LE = b"\0\1"
 HOLE = b"\0"  # a placeholder for a number; no JSON text contains it
 STRING_OR_NUMBER = re.compile(rb'("(?:[^"\\]|\\.)*")|-?\d[-+.\de]*')
@@ -258,9 +261,10 @@ POINT_ZERO = 2  # characters `.0` to remove from an integer written as a float
 
 
 class BinaryLayout(NamedTuple):
-    """The positions of numbers in messages, the bytes that all of them share, and the JSON text in between.
+    """The layout of messages with equal bytes apart from their numbers, for reading many at once.
 
-    sample: the message that it was learned from
+    numbers: the positions and types of the numbers; shared: the parts whose bytes must be those of the sample
+    texts: the JSON text around the numbers; sample: the message that the layout was learned from
     """
 
     numbers: np.dtype[Any]
@@ -269,7 +273,7 @@ class BinaryLayout(NamedTuple):
     sample: bytes
 
     def values(self, messages: Sequence[bytes]) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-        """Return the numbers of messages of equal length, (n, k), and the mask of those that only differ in them.
+        """Return the numbers of messages of equal length, (n, k), and the mask of messages that have this layout.
 
         Messages with numbers that are not finite are not in the mask.
         """
@@ -282,7 +286,7 @@ class BinaryLayout(NamedTuple):
         return numbers, alike
 
     def lines(self, numbers: NDArray[np.float64]) -> bytes:
-        """Return messages with these numbers, (n, k), as lines."""
+        """Return the JSON lines of messages with these numbers, (n, k)."""
         names = self.numbers.names or ()
         written = float_spans(numbers, b" " * len(names))
         ends = written.ends - np.array([1 + POINT_ZERO * (self.numbers[name].kind != "f") for name in names])
@@ -293,7 +297,7 @@ class BinaryLayout(NamedTuple):
 
 
 def _repeated(text: bytes, count: int) -> Spans:
-    """Return a text for each row, in pieces that are copied at once."""
+    """Return one text for each of `count` rows, as spans."""
     starts = np.arange(0, len(text), MARGIN)
     ends = np.minimum(starts + MARGIN, len(text))
     return Spans(framed(text), np.tile(starts + MARGIN, (count, 1)), np.tile(ends + MARGIN, (count, 1)))
@@ -337,7 +341,7 @@ def numbers_in(types: MessageTypes, kind: str, data: bytes) -> tuple[list[tuple[
 
 
 def layout_of(types: MessageTypes, channel: Channel, data: bytes) -> BinaryLayout | None:
-    """Return the layout of messages like this one; None unless it gives the same line as the full reader."""
+    """Return the layout of messages like this one; None if it would give another line than the full reader."""
     try:
         line = text_of(types, channel, data)
         found, shared = numbers_in(types, channel.type, data)
@@ -357,7 +361,7 @@ def layout_of(types: MessageTypes, channel: Channel, data: bytes) -> BinaryLayou
 def alike(
     types: MessageTypes, messages: Sequence[Recorded]
 ) -> Iterator[tuple[list[int], BinaryLayout, NDArray[np.float64]]]:
-    """Yield the indices of messages of one layout, and their numbers, (n, k); others are not yielded."""
+    """Yield the indices of messages of one layout, the layout, and their numbers (n, k); skip messages without one."""
     groups: dict[Any, list[int]] = {}
     for at, each in enumerate(messages):
         groups.setdefault((each.channel, len(each.data)), []).append(at)
@@ -389,7 +393,7 @@ class RawTransform(NamedTuple):
 
 
 def numbers_of(moved: Any, turned: Any) -> Rigid:
-    """Return the components of two parts of a message, a position and a quaternion."""
+    """Return the components tx, ty, tz, x, y, z, w of a position and a quaternion in a message."""
     return moved.x, moved.y, moved.z, turned.x, turned.y, turned.z, turned.w
 
 
@@ -408,7 +412,10 @@ def read(file: InputFile, options: Options) -> Iterator[EdgeColumns]:
 
 
 def _channels(reader: RecordingReader, options: Options) -> list[Channel]:
-    """Return the chosen channels with transforms or poses, or all with transforms; FormatError if the bag has none."""
+    """Return the chosen channels with transforms or poses, by default all with transforms.
+
+    Raises FormatError if there are no such channels.
+    """
     chosen = options.topics.chosen
     options.topics.seen |= {each.topic for each in reader.channels}
     with_frames, posed = reader.on_topics(TYPES), reader.on_topics(POSES, chosen)
@@ -432,7 +439,7 @@ def recorded_edges(reader: RecordingReader, channels: Sequence[Channel], options
 def raw_transforms(
     reader: RecordingReader, channels: Sequence[Channel], answers: Answers
 ) -> Iterator[list[tuple[RawTransform, int, Recorded]]]:
-    """Yield the transforms and poses of the messages on some channels, many together, each with its message.
+    """Yield lists of the transforms and poses on some channels, each with its message and the message's number.
 
     Messages are numbered from 1; those of equal layout are read at once.
     """
@@ -441,7 +448,7 @@ def raw_transforms(
         found: dict[int, list[RawTransform]] = {}
         for at, layout, values in alike(reader.types, messages):
             known = _transforms(reader, messages[at[0]]._replace(data=layout.sample), 0, answers)
-            if known and values.shape[1] in (9 * len(known), 10 * len(known)):  # ROS 1 counts its headers
+            if known and values.shape[1] in (9 * len(known), 10 * len(known)):  # headers of ROS 1 have a counter
                 numbers = np.vstack([layout.values([layout.sample])[0], values])
                 own, *rows = numbers.reshape(len(numbers), len(known), -1)[:, :, -9:].tolist()
                 if own == [[*each.stamp, *each.numbers] for each in known]:
@@ -459,7 +466,7 @@ def raw_transforms(
 
 
 def _transforms(reader: RecordingReader, message: Recorded, number: int, answers: Answers) -> list[RawTransform]:
-    """Return the transforms in a message, or the pose; raises FormatError for invalid bytes."""
+    """Return the transforms, or poses, in a message; raises FormatError for invalid bytes."""
     channel, body, found = message.channel, body_of(message.channel.topic, answers), list[RawTransform]()
     try:
         contents = reader.types.read(channel, message.data)
@@ -481,7 +488,7 @@ def _columns(
 ) -> Iterator[EdgeColumns]:  # fmt: skip
     """Yield the edges of many messages at once; raises FormatError for the first invalid one, after those before it.
 
-    rows: transforms, each with the number of its message among those with transforms
+    rows: transforms, each with the number of its message, and the message
     """
     transforms, lines, sent = zip(*rows, strict=True)
     *names, numbers, stamps = zip(*transforms, strict=True)

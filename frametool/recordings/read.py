@@ -1,6 +1,6 @@
 """Read recordings: ROS 1 bags with rosbags, MCAP files with mcap, databases with sqlite3; the extra `frametool[bag]`.
 
-Messages are bytes, in the order of their log times; `MessageTypes` makes objects of rosbags of them.
+Messages are bytes, in the order of their log times; `MessageTypes` converts them to objects of rosbags.
 """
 
 from __future__ import annotations
@@ -35,11 +35,11 @@ QOS, HASH = "offered_qos_profiles", "topic_type_hash"  # metadata of rosbag2 abo
 MOST = 1 << 28  # bytes of a chunk: a larger one is not unpacked
 LOST = "SELECT count(*) FROM messages WHERE topic_id NOT IN (SELECT id FROM topics)"
 NO_SUMMARY = "{} has no summary: whether it lost messages cannot be known"
-RECORD_HEAD = 9  # bytes
+RECORD_HEAD = 9  # bytes of a record's header
 RECORD, MESSAGE = Struct("<BQ"), Struct("<HIQQ")  # the header of a record, and of a message in it (mcap.dev/spec)
-BLOCK = 1 << 10  # messages
+BLOCK = 1 << 10  # messages of a block
 TF = "tf2_msgs/msg/TFMessage"
-MANY = 4000  # messages
+MANY = 4000  # messages of a block in order of time
 
 
 @dataclass(eq=False, slots=True)
@@ -79,7 +79,8 @@ class Recorded(NamedTuple):
 class McapFile:
     """An MCAP file.
 
-    compression: of its chunks; stated: channel -> number of messages, total: of all; None if not stated
+    channels: id -> channel; compression: of its chunks
+    stated: channel id -> number of messages, total: of all; None if the file does not state it
     """
 
     def __init__(self, path: Path, opened: ExitStack, tally: Diagnostics) -> None:
@@ -119,7 +120,7 @@ class McapFile:
         yield from StreamReader(self.stream, emit_chunks=True).records
 
     def _records(self, numbers: set[int]) -> Iterator[Any]:
-        """Yield the records with messages of some channels: chunk by chunk, or else all records."""
+        """Yield the chunks with messages on some channels, or all records if there is no index of chunks."""
         from mcap.data_stream import ReadDataStream
         from mcap.records import Chunk
 
@@ -131,7 +132,7 @@ class McapFile:
                 yield Chunk.read(ReadDataStream(self.stream))
 
     def found(self, numbers: set[int]) -> Iterator[list[Recorded]]:
-        """Yield the messages in and outside of chunks, many together; register schemas and channels."""
+        """Yield the messages on some channels, by their ids, in blocks; register schemas and channels."""
         from mcap import records
 
         found: list[Recorded] = []
@@ -150,7 +151,7 @@ class McapFile:
         yield found
 
     def _take(self, chunk: Any, numbers: set[int], found: list[Recorded]) -> None:
-        """Add the messages on some channels that are in a chunk; register schemas and channels.
+        """Append the messages on some channels that are in a chunk to `found`; register schemas and channels.
 
         Raises ValueError for a chunk that is too large, before it is unpacked.
         """
@@ -197,9 +198,9 @@ class McapFile:
 
 
 def _in_order(chunks: Iterable[list[Recorded]]) -> Iterator[list[Recorded]]:
-    """Yield the messages of chunks in the order of their times, many together; those before an error too.
+    """Yield the messages of chunks in the order of log times, in blocks; chunks that overlap are merged.
 
-    Chunks that overlap are merged.  No chunk is empty.
+    chunks: none is empty.  If reading fails, the messages before the error are yielded first.
     """
     time, ready, held = itemgetter(1), list[Recorded](), list[Recorded]()
     try:
@@ -220,10 +221,10 @@ def _in_order(chunks: Iterable[list[Recorded]]) -> Iterator[list[Recorded]]:
 class DatabaseFile:
     """A sqlite3 file of rosbag2; the contents of its tables depend on its version."""
 
-    head, compression, stated, total, others = None, "", None, None, tuple  # there are no others
+    head, compression, stated, total, others = None, "", None, None, tuple  # it has no attachments or metadata
 
     def __init__(self, path: Path, opened: ExitStack, _tally: Diagnostics) -> None:
-        """Let sqlite3 check its pages, because rows on a broken one would be missing silently, and read its topics."""
+        """Check the file with sqlite3, because rows on a broken page would be missing silently, and read its topics."""
         from sqlite3 import Row, connect
 
         self.database = connect(f"{path.absolute().as_uri()}?mode=ro", uri=True)
@@ -247,7 +248,7 @@ class DatabaseFile:
             self.channels[topic["id"]] = made
 
     def found(self, numbers: set[int]) -> Iterator[list[Recorded]]:
-        """Yield the messages on some channels."""
+        """Yield the messages on some channels, by their ids, in blocks."""
         some = ",".join(map(str, numbers))
         some = f"SELECT topic_id, timestamp, data FROM messages WHERE topic_id IN ({some}) ORDER BY timestamp, id"  # noqa: S608 - numbers
         rows = self.database.execute(some)
@@ -258,7 +259,7 @@ class DatabaseFile:
 class Bag1File:
     """A ROS 1 bag; chunks are read whole, without the index of their messages."""
 
-    head, compression, others = None, "", tuple  # there are no others
+    head, compression, others = None, "", tuple  # it has no attachments or metadata
 
     def __init__(self, path: Path, opened: ExitStack, _tally: Diagnostics) -> None:
         """Read the index of connections and chunks at the end of the file."""
@@ -266,7 +267,7 @@ class Bag1File:
 
         class Unindexed(Reader):
             def read_index_data(self, pos: int, indexes: Any) -> None:
-                """Leave it unread."""
+                """Do nothing."""
 
         self.reader: Any = opened.enter_context(Unindexed(path))
         self.channels = {}
@@ -278,7 +279,7 @@ class Bag1File:
         self.total = self.stated.total()
 
     def found(self, numbers: set[int]) -> Iterator[list[Recorded]]:
-        """Yield the messages of each chunk on some channels."""
+        """Yield the messages on some channels, by their ids, chunk by chunk."""
         from rosbags.rosbag1.reader import Header, RecordType, read_bytes, read_uint32
 
         infos = (each for each in self.reader.chunk_infos if not numbers.isdisjoint(each.connection_counts))
@@ -302,7 +303,7 @@ class Bag1File:
 
 @lru_cache
 def typestore(*, ros1: bool) -> Any:
-    """Return the usual types of messages."""
+    """Return the message types of ROS 1 Noetic or ROS 2 Humble."""
     from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
     store = get_typestore(Stores.ROS1_NOETIC if ros1 else Stores.ROS2_HUMBLE)
@@ -312,17 +313,17 @@ def typestore(*, ros1: bool) -> Any:
 
 
 class MessageTypes:
-    """The types of some channels: those defined in the recording, or the usual ones if it defines none."""
+    """The types of some channels: as defined in the recording, or the usual ones if it does not define them."""
 
     def __init__(self, channels: Sequence[Channel], *, ros1: bool) -> None:
-        """Create an empty set; a type that cannot be read affects only its own messages."""
+        """Create an empty set; types are learned when needed: an unreadable one affects only its own messages."""
         from rosbags.interfaces import Nodetype
         from rosbags.typesys import Stores, get_typestore
 
         self.channels, self.ros1 = channels, ros1
         self.layouts: dict[tuple[Channel, int], list[Any]] = {}  # channel and length of messages -> learned layouts
         self.store: Any = get_typestore(Stores.EMPTY)
-        if ros1:  # whose seconds have no sign (wiki.ros.org/msg); the library has int32
+        if ros1:  # seconds of ROS 1 are unsigned (wiki.ros.org/msg); the library has int32
             parts: Any = [(name, (Nodetype.BASE, ("uint32", 0))) for name in ("sec", "nanosec")]
             self.store.fielddefs["builtin_interfaces/msg/Time"] = [], parts
 
@@ -368,12 +369,12 @@ class MessageTypes:
 class RecordingReader:
     """An open recording.
 
-    all: its channels, equal ones of several files merged; channels: those with an encoding of ROS
+    all: its channels, equal ones of several files merged; channels: those in the encoding of its ROS version
     metadata: of a folder, every value as text
     """
 
     def __init__(self, path: str, opened: ExitStack, tally: Diagnostics) -> None:
-        """Open its files; the stack closes them."""
+        """Open its files, which are closed by the stack."""
         self.path, self.metadata, files = path, dict[str, Any](), [Path(path)]
         if files[0].is_dir():
             self.metadata = read_metadata((files[0] / METADATA).read_text(encoding="utf-8"), f"{path}/{METADATA}")
@@ -410,11 +411,11 @@ class RecordingReader:
         self.types = MessageTypes(self.channels, ros1=self.is_ros1)
 
     def messages(self, wanted: Collection[Channel] | None = None) -> Iterator[Recorded]:
-        """Yield the messages on some channels, or on all; raises FormatError if any are missing."""
+        """Yield the messages on some channels, or on all; raises FormatError if messages are missing."""
         return chain.from_iterable(self.blocks(wanted))
 
     def blocks(self, wanted: Collection[Channel] | None = None) -> Iterator[Sequence[Recorded]]:
-        """Yield them in lists of varying length."""
+        """Yield the messages as `messages` does, in lists of varying length."""
         total, wanted = 0, None if wanted is None else {*wanted}
         for file in self.files:
             count, numbers = 0, {number for number, each in file.channels.items() if wanted is None or each in wanted}
@@ -427,7 +428,7 @@ class RecordingReader:
                 else:
                     yield block
             known = None if file.stated is None else sum(file.stated.get(number, 0) for number in numbers)
-            self._check(wanted, count, known, file.total if wanted is None else None)  # a channel may be lost
+            self._check(wanted, count, known, file.total if wanted is None else None)  # total: also lost channels
             total += count
         named = {(each.topic, each.type) for each in wanted or ()}
         counts = [int(each["count"]) for each in self._topics if (each["name"], each["type"]) in named]
@@ -435,7 +436,7 @@ class RecordingReader:
         self._check(wanted, total, self.metadata.get("message_count") if wanted is None else stated)
 
     def _check(self, wanted: Collection[Channel] | None, count: int, *stated: Any) -> None:
-        """Raise FormatError unless all stated messages were found."""
+        """Raise FormatError unless the number of messages is as stated."""
         for expected in stated:
             if expected is not None and int(expected) != count:
                 names = "" if wanted is None else f" on {', '.join(sorted({each.topic for each in wanted}))}"
@@ -449,7 +450,7 @@ class RecordingReader:
 
 
 def read_metadata(text: str, name: str) -> dict[str, Any]:
-    """Read metadata, of a folder or in an MCAP file; all values are text.
+    """Parse rosbag2's metadata, of a folder or in an MCAP file; all values are text.
 
     Raises ValueError if they are not YAML.
     """
@@ -463,7 +464,7 @@ def read_metadata(text: str, name: str) -> dict[str, Any]:
 
 @contextmanager
 def opened_recording(path: str, tally: Diagnostics) -> Iterator[RecordingReader]:
-    """Open a recording; any exception of the libraries for a broken one becomes one error.
+    """Open a recording; any exception of the libraries for a broken one becomes a FormatError.
 
     Raises FileProblem without the extra.
     """
@@ -487,7 +488,7 @@ def require_extra(what: str) -> None:
 
 @contextmanager
 def broken(path: str) -> Iterator[None]:
-    """Convert any exception from reading a broken bag into one error, even MemoryError."""
+    """Convert any exception from reading a broken bag, even MemoryError, into a FormatError."""
     try:
         yield
     except (FrametoolError, BrokenPipeError):

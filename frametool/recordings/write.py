@@ -1,7 +1,7 @@
 """Write recordings: MCAP files and folders with mcap, ROS 1 bags with rosbags, the extra `frametool[bag]`.
 
-Messages are made by rosbags, once for each set of frames; stamps and numbers are then written into the bytes, for one
-message or a million.  They are logged at their stamps, or at the previous log time if a stamp goes back.
+Messages are serialised by rosbags once for each set of frames; stamps and numbers are then written into the bytes.
+They are logged at their stamps, or at the previous log time if a stamp goes back.
 """
 
 from __future__ import annotations
@@ -36,22 +36,23 @@ if TYPE_CHECKING:
     from frametool.grammar.result import Style
     from frametool.text.spans import Floats, Ints
 
-    Sample = tuple[int, tuple[str, str], Sequence[float]]  # its stamp, parent and child, and numbers
+    Sample = tuple[int, tuple[str, str], Sequence[float]]  # stamp, (parent, child), numbers
 
-NAME = "recording"  # of the file in a bag2 folder, whatever the folder's name: two runs write the same bytes
+NAME = "recording"  # of the file in a bag2 folder, independent of the folder's name, so that two runs agree
 PIECE = 1 << 20  # bytes
 VERSION, VERSION_OF_NUMBERS = 9, 8  # of metadata: the newest, and the last with numeric policies
-BY_NUMBERS = re.compile(r"\bhistory: *\d")  # in a quality of service
-SECONDS = {BAG1: (0, (1 << 32) - 1)}  # of a stamp; int32 in ROS 2
+BY_NUMBERS = re.compile(r"\bhistory: *\d")  # in a quality of service: policies are numbers
+SECONDS = {BAG1: (0, (1 << 32) - 1)}  # range of the seconds of a stamp; int32 in ROS 2
 SECONDS_ROS2 = (-(1 << 31), (1 << 31) - 1)
 _PROBE, _PROBE_NS = 1.2345678912345e-67, 1532698752_187654321  # a number and a stamp with unique bytes
 
 
 class Kind(NamedTuple):
-    """One kind of message: its type, and the count of numbers per stamp; its name is the default topic.
+    """One kind of message.
 
-    each: of a list, the type of its items
-    latched: late subscribers get it too
+    type: of the messages; numbers: their count per stamp
+    each: the type of the items of a list, "" for other messages
+    latched: late subscribers receive it too
     """
 
     type: str
@@ -82,7 +83,7 @@ def check_stamps(stamps_ns: Ints, fmt: str) -> None:
 
 
 def filled(kind: Kind, fmt: str, frames: tuple[str, str], stamps_ns: Ints, numbers: Floats) -> list[bytes]:
-    """Return a message about one frame, or about one in another, for each of stamps (n,) and numbers (n, k)."""
+    """Return a message for each of stamps (n,) and numbers (n, k), all with the same frames."""
     data, stamp_at, numbers_at = _template(kind, fmt, frames)
     count, size = len(stamps_ns), len(data)
     rows = np.tile(np.frombuffer(data, np.uint8), (count, 1))
@@ -96,7 +97,7 @@ def filled(kind: Kind, fmt: str, frames: tuple[str, str], stamps_ns: Ints, numbe
 
 @lru_cache(1 << 10)
 def _template(kind: Kind, fmt: str, frames: tuple[str, str]) -> tuple[bytes, int, int]:
-    """Return the bytes of a message, and the positions of its stamp and its numbers."""
+    """Return the bytes of a message, and the positions of its stamp and numbers in them."""
     numbers = [_PROBE * (at + 1) for at in range(kind.numbers)]
     data = serialised(kind, fmt, [(_PROBE_NS, frames, numbers)])
     stamp_at = data.index(struct.pack("<II", *divmod(_PROBE_NS, BILLION)))
@@ -104,9 +105,9 @@ def _template(kind: Kind, fmt: str, frames: tuple[str, str]) -> tuple[bytes, int
 
 
 def serialised(kind: Kind, fmt: str, samples: Iterable[Sample]) -> bytes:
-    """Return one message of some transforms, poses or points; raises ValueInvalid for names that are not text."""
+    """Return one message with some transforms, poses or points; raises ValueInvalid for invalid text in names."""
     store = typestore(ros1=fmt == BAG1)
-    whole = []  # the contents of stamped messages, in the order of their definitions
+    whole = []  # the values of each stamped message, in the order of its definition
     for stamp_ns, frames, numbers in samples:
         second, part = divmod(stamp_ns, BILLION)
         stamp = (second + (1 << 31)) % (1 << 32) - (1 << 31), part  # rosbags takes seconds of ROS 1 as int32
@@ -126,7 +127,7 @@ def serialised(kind: Kind, fmt: str, samples: Iterable[Sample]) -> bytes:
 
 
 def _built(store: Any, kind: str, leaves: Iterator[Any]) -> Any:
-    """Return a message of a type; headers of ROS 1 have a counter too."""
+    """Return a message of a type from the values of its fields, depth first; the counter of ROS 1 headers is 0."""
     from rosbags.interfaces import Nodetype
 
     parts = (
@@ -143,12 +144,12 @@ class FirstPiece(bytes):
 
 
 class RecordingFile:
-    """A recording that is being written, to an unnamed file until `pieces` yields its contents."""
+    """A recording that is being written to an unnamed file, until `pieces` yields its contents."""
 
     def __init__(self, fmt: str, folder: str = "", compression: str = "", *, head: Any = None) -> None:
-        """Open it in a folder for temporary files; raises FileProblem without the extra.
+        """Open the unnamed file in a folder; raises FileProblem without the extra.
 
-        Of MCAP, compression: of its chunks; head: profile and library
+        folder: for temporary files, "" for the default; of MCAP, compression: of its chunks; head: profile and library
         """
         read.require_extra("recordings are written")
         from mcap.writer import CompressionType
@@ -157,10 +158,10 @@ class RecordingFile:
 
         self.format, self.log_ns = fmt, 0
         self.counts: dict[Channel, int] = {}
-        self.span: tuple[int, int] | None = None  # of log times
+        self.span: tuple[int, int] | None = None  # first and last log time
         self._itself: dict[str, Any] | None = None  # rosbag2's metadata in the source of a copy
         self._folder = folder
-        self._numbers: dict[Any, Any] = {}  # of schemas and channels, or connections
+        self._numbers: dict[Any, Any] = {}  # ids of schemas and channels, or connections
         with room_in(folder):
             home = Path(mkdtemp(".part", ".frametool.", folder or None))
             place = home / NAME
@@ -179,7 +180,7 @@ class RecordingFile:
             rmtree(home)
 
     def channel(self, name: str, topic: str = "") -> Channel:
-        """Return the channel of a kind of messages, by default on its usual topic."""
+        """Return the channel for a kind of messages, by default on its usual topic; registered at first use."""
         if name not in self._numbers:
             self._numbers[name] = new_channel(KINDS[name], topic or f"/{name}", ros1=self.format == BAG1)
             self.begin([self._numbers[name]])
@@ -187,7 +188,7 @@ class RecordingFile:
         return found
 
     def begin(self, channels: Iterable[Channel]) -> None:
-        """Begin some channels."""
+        """Register the channels that are new."""
         for each in channels:
             if each in self.counts:
                 continue
@@ -205,7 +206,7 @@ class RecordingFile:
             self.counts[each], self._numbers[each] = 0, number
 
     def write(self, messages: Iterable[tuple[Channel, int, bytes]]) -> None:
-        """Write messages with their channels and stamps; a late one is logged with the previous one."""
+        """Write messages with their channels and stamps; if a stamp goes back, the previous log time is used."""
         logged = []
         for channel, stamp_ns, data in messages:
             self.log_ns = max(self.log_ns, stamp_ns)
@@ -213,7 +214,7 @@ class RecordingFile:
         self.add(logged)
 
     def add(self, messages: Iterable[Recorded]) -> None:
-        """Write messages as they were recorded."""
+        """Write messages with their recorded times."""
         with room_in(self._folder):
             for channel, log_ns, data, publish_ns, sequence in messages:
                 number = self._numbers[channel]
@@ -226,7 +227,7 @@ class RecordingFile:
                 self.span = min(first, log_ns), max(last, log_ns)
 
     def add_other(self, other: Any) -> None:
-        """Write an attachment or metadata, a record of mcap; rosbag2's metadata about the file itself are replaced."""
+        """Write an attachment or metadata, a record of mcap; rosbag2's metadata about the file are written anew."""
         if not hasattr(other, "metadata"):
             self._writer.add_attachment(other.create_time, other.log_time, other.name, other.media_type, other.data)
         elif other.name == read.ITSELF:
@@ -237,7 +238,9 @@ class RecordingFile:
     def pieces(self, before: dict[str, Any] | None = None) -> Iterator[bytes]:
         """Finish the recording and yield its bytes; for a folder file after file, each starting with a FirstPiece.
 
-        before: the metadata of the source of a copy, which has those about the file itself if its source had
+        before: metadata of the source of a copy, None for a new recording; a copy in MCAP has rosbag2's metadata about
+            the
+            file only if its source has
         """
         metadata: dict[str, Any] = {}
         with room_in(self._folder):
@@ -260,7 +263,7 @@ class RecordingFile:
         self._discard()
 
     def _metadata(self, before: dict[str, Any]) -> dict[str, Any]:
-        """Return rosbag2's metadata of a recording, including those of its source."""
+        """Return rosbag2's metadata of the recording; some values are those of the source of a copy."""
         from rosbags.rosbag2.metadata import dump_qos_v9, parse_qos
 
         first, last = self.span or (0, 0)
@@ -323,7 +326,7 @@ def _discarded(stream: IO[bytes], file: IO[bytes], folder: Path) -> None:
 
 @contextmanager
 def room_in(folder: str) -> Iterator[None]:
-    """Turn errors of the system into FileProblem with the folder, such as a full disk."""
+    """Convert errors of the system, such as a full disk, into FileProblem with the folder."""
     try:
         yield
     except FrametoolError:

@@ -72,7 +72,7 @@ def _entries(cells: Sequence[str], names: Sequence[str]) -> list[dict[str, Any]]
 
 
 def _nested(names: Sequence[str], cells: Sequence[str]) -> dict[str, Any]:
-    """Arrange cells by their dotted names; a stamp in nanoseconds becomes secs and nsecs."""
+    """Return cells as a nested mapping by their dotted names; a stamp in nanoseconds becomes secs and nsecs."""
     message: dict[str, Any] = {}
     for name, cell in zip(names, cells, strict=True):
         *outer, last = name.split(".")
@@ -89,7 +89,11 @@ def _nested(names: Sequence[str], cells: Sequence[str]) -> dict[str, Any]:
 
 
 class TextMessage(NamedTuple):
-    """The plain values of one message, with its text and the number of its first line; document: None for a row."""
+    """One message in a text.
+
+    value: its plain values; source: its text; line: number of its first line in the file
+    document: index in the text, None for a row; received_ns: time of reception, if printed
+    """
 
     value: Any
     source: Source
@@ -98,7 +102,7 @@ class TextMessage(NamedTuple):
     received_ns: int | None = None
 
     def error(self, misfit: Misfit) -> FormatError:
-        """Return the error for this message, with its place in the whole file."""
+        """Return an error for this message, with its place in the whole file."""
         if self.document is None:
             error = FormatError(str(misfit), source=self.source.name, line=1, rule=misfit.rule)
         else:
@@ -108,13 +112,13 @@ class TextMessage(NamedTuple):
 
 
 def read_messages(stream: BinaryIO, name: str, tally: Diagnostics) -> Iterator[TextMessage | FormatError]:
-    """Yield the messages printed by the echo tools; an unreadable one is replaced by its error."""
+    """Yield the messages printed by the echo tools; for an unreadable one its error."""
     for piece in documents(stream, name):
         yield from piece_messages(piece, name, "echo", tally)
 
 
 def piece_messages(piece: Piece, name: str, fmt: str, tally: Diagnostics) -> Iterator[TextMessage | FormatError]:
-    """Yield the messages of documents that end in `---`, or of lines."""
+    """Yield the messages of a piece of text: documents that end in `---`, or lines of jsonl."""
     texts: Iterable[tuple[int, str]] = _data_lines(piece, tally)
     if fmt != "jsonl":
         texts = ((line, messages.without_noise(text, line, tally)) for text, line in _cut(piece, "---\n", 1))
@@ -141,7 +145,7 @@ def _data_lines(piece: Piece, tally: Diagnostics) -> Iterator[tuple[int, str]]:
 
 
 def _csv(stream: BinaryIO, name: str, tally: Diagnostics) -> Iterator[TextMessage | FormatError]:
-    """Read rows: under a header of `rostopic echo -p`, `%time,..`, or without one, of `ros2 topic echo --csv`.
+    """Yield the messages of rows of `rostopic echo -p`, below a header, or of `ros2 topic echo --csv`, without one.
 
     Yields an error for a row that does not fit its header, or that is neither a pose nor transforms.
     """
@@ -185,7 +189,7 @@ def read(file: InputFile, options: Options) -> Iterator[Edge | EdgeColumns]:
 
 
 def _cut(piece: Piece, end: str, size: int) -> Iterator[Piece]:
-    """Split a piece at the ends of documents or lines into chunks of a size, or of one longer document."""
+    """Split a piece at ends of documents or lines into chunks of about `size` characters, or one longer document."""
     text, line = piece
     at = 0
     while at < len(text):
@@ -199,7 +203,7 @@ def _cut(piece: Piece, end: str, size: int) -> Iterator[Piece]:
 
 
 def _plain(piece: Piece, end: str, file: InputFile, options: Options) -> Iterator[Edge | EdgeColumns]:
-    """Read plain messages fast, all at once or by bisection, and the others in full."""
+    """Yield the edges of a piece: plain messages by the fast path, at once or by bisection, others in full."""
     found = plain_columns(*piece, options.tally, normalize=options.normalize)
     if found and not found.topics:
         yield found
@@ -216,7 +220,7 @@ def _plain(piece: Piece, end: str, file: InputFile, options: Options) -> Iterato
 
 
 def _message_edges(message: TextMessage | FormatError, options: Options) -> Iterator[Edge]:
-    """Yield the edges of one message; an error in one of them does not affect the others."""
+    """Yield the edges of one message; an error in one of them is reported and does not affect the others."""
     if isinstance(message, FormatError):
         options.report(message)
         return
@@ -227,7 +231,7 @@ def _message_edges(message: TextMessage | FormatError, options: Options) -> Iter
         return
     text = message.source.text
     starts = [match.start() for match in _HEADER.finditer(text)] if text.count("\n") > 1 else []
-    numbers = [message.line + text.count("\n", 0, start) for start in starts]  # of the lines on which they begin
+    numbers = [message.line + text.count("\n", 0, start) for start in starts]  # lines on which headers begin
     if len(numbers) != len(found):
         numbers = [message.line] * len(found)
     topic = messages.topic_of(message.value)
@@ -247,7 +251,7 @@ def _message_edges(message: TextMessage | FormatError, options: Options) -> Iter
 
 
 def _transforms(value: Any, path: Path, options: Options) -> Iterator[tuple[dict[str, Any], Path]]:
-    """Yield every transform of a message, or of a list of messages; count messages without any.
+    """Yield every transform of a message, or of a list of messages, with its path; count messages without transforms.
 
     A pose counts as a transform if its topic was chosen, or if messages have no topics.
     """
@@ -281,7 +285,7 @@ PLACED = {
     "child_frame_id": "NAME",
     "transform": {"translation": dict.fromkeys("xyz", "NUMBER"), "rotation": dict.fromkeys("xyzw", "NUMBER")},
 }
-FIELDS, FIELDS1 = {"header": STAMPED, **PLACED}, {"header": STAMPED1, **PLACED}  # of ROS 2, and of ROS 1
+FIELDS, FIELDS1 = {"header": STAMPED, **PLACED}, {"header": STAMPED1, **PLACED}  # of ROS 2 and of ROS 1
 
 
 def _block(fields: dict[str, Any], indent: str) -> str:
@@ -320,8 +324,9 @@ JSON_GROUPS = {
 class MessageLayout(NamedTuple):
     """How a tool writes messages of transforms: the patterns of one transform, and of the text around it.
 
-    opening: of a message, with a group if it names a topic; closing: of the last one; gap: between two transforms
-    lines: of one transform, 0 if a message is one line; first: the line that errors name
+    opening: of a message, with a group if it names a topic; entry: of one transform
+    gap: between two transforms; closing: of the last message
+    lines: number of lines of one transform, 0 if a message is one line; first: index of the line that errors name
     """
 
     opening: re.Pattern[str]
@@ -333,7 +338,7 @@ class MessageLayout(NamedTuple):
 
 
 def _layout(groups: dict[str, str], opening: str, entry: str, between: str, closing: str) -> MessageLayout:
-    """Return a layout made from the texts of its parts, in which `groups` replaces words by patterns."""
+    """Return a layout from the texts of its parts, in which `groups` maps words to patterns."""
     lines, first = entry.count("\n"), entry[: entry.index("header")].count("\n")
     for word, pattern in groups.items():
         opening, entry = opening.replace(word, pattern), entry.replace(word, pattern)
@@ -358,7 +363,7 @@ EACH = 12  # items that `split` returns per transform: text, two parts of the st
 
 
 def plain_columns(text: str, line: int, tally: Diagnostics, *, normalize: bool = False) -> EdgeColumns | None:
-    """Return the edges of a text that begins on a line; None, and no warnings, if not every message is plain.
+    """Return the edges of a text that begins on a line; None, without warnings, if it has other than plain messages.
 
     A single `split` finds all transforms, and the remaining text shows whether there is anything else.
     normalize: accept any non-zero quaternion.
@@ -390,14 +395,14 @@ def edge_columns(
     lines: Sequence[int], tally: Diagnostics, *, normalize: bool, topics: Iterable[str] = (),
     received_ns: Iterable[int] = (),
 ) -> EdgeColumns:  # fmt: skip
-    """Return edges with unit quaternions; raises ValueInvalid, with no warnings about numbers, if one is refused.
+    """Return edges with unit quaternions; raises ValueInvalid for invalid values, without warnings about numbers.
 
     names: of parents and of children; stamps: seconds and nanoseconds; rows: components as they were read
     """
     seconds, nanoseconds = stamps
     if not all(map(all, names)):
         raise ValueInvalid("an empty frame name")
-    if problem := stamp_problem(max(seconds), max(nanoseconds), STAMPS[0]):  # none can be below the range
+    if problem := stamp_problem(max(seconds), max(nanoseconds), STAMPS[0]):  # stamps here are never below the range
         raise problem
     rough: list[int] = []
     components = [unit_components(row, line, rough, normalize) for row, line in zip(rows, lines, strict=True)]
@@ -409,7 +414,8 @@ def edge_columns(
 def unit_components(numbers: Rigid, line: int, rough: list[int], normalize: bool) -> Rigid:  # noqa: FBT001 - fast
     """Return tx, ty, tz, x, y, z, w with a unit quaternion; raises ValueInvalid for numbers that every reader refuses.
 
-    normalize: accept any non-zero quaternion.  rough: receives the line of one that was normalised.
+    normalize: accept any non-zero quaternion.  rough: receives the line if the quaternion was off by more than
+        rounding.
     """
     tx, ty, tz, x, y, z, w = numbers
     squared = x * x + y * y + z * z + w * w

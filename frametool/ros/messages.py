@@ -50,8 +50,8 @@ STAMPS = (("sec", "nanosec"), ("secs", "nsecs"), ("sec", "nsec"))  # ROS 2, ROS 
 SECONDS = {"sec": range(-(1 << 31), 1 << 32), "secs": range(1 << 32)}  # int32 of ROS 2, uint32 of the others
 PARTS, HAS = "a TransformStamped has header, child_frame_id, transform", "a message with a pose has header, pose"
 _TRANSFORM, _POSE = ("translation", "rotation"), ("position", "orientation")
-# messages with more than one part, or whose content is not obvious: the fields expressed in the frame of the header,
-# and their kinds, then the fields in another frame, which are unchanged; all other messages name their content
+# messages with several parts, or whose content is not obvious: the fields expressed in the header's frame with their
+# kinds, and the fields in other frames, which are unchanged; in other messages the key is the kind of the content
 HELD: dict[str, tuple[dict[str, str], tuple[str, ...]]] = {
     "Imu": ({"orientation": "attitude", "angular_velocity": "vector", "linear_acceleration": "vector"}, ()),
     "MagneticField": ({"magnetic_field": "vector"}, ()),
@@ -69,7 +69,7 @@ STALE_DEGREES = 0.1
 
 
 def is_message(value: dict[str, Any]) -> bool:
-    """Return True if a mapping is a TransformStamped, a list of them, or either in rosbridge's envelope."""
+    """Return True if a mapping is a TransformStamped, a list of them, or one of these in rosbridge's envelope."""
     return (not MARKS.isdisjoint(value) and "frame_id" not in value) or is_envelope(value)
 
 
@@ -84,7 +84,7 @@ def topic_of(value: Any) -> str:
 
 
 def on_topic(edge: Edge, name: str, options: Options) -> Edge:
-    """Remove the stamp of an edge on tf_static; the same frame on two topics is an error."""
+    """Return an edge, without its stamp on tf_static; a frame on two topics is reported as an error."""
     if problem := options.topics.conflict(edge.topic, edge.child):
         options.report(FormatError(problem, source=name, line=edge.line, column=1, rule="two-topics"))
     return edge._replace(stamp_ns=None) if edge.topic.endswith("tf_static") else edge
@@ -141,7 +141,7 @@ def read_transform(
 
 
 def _warn_of_stale_angles(value: Any, rotation: Quaternion, reading: Reading) -> None:
-    """Compare the angles of an entry with its quaternion; the quaternion is used."""
+    """Warn if the angles of an entry differ from its quaternion, which is used."""
     from math import degrees
 
     from frametool.geometry import floats, quaternion
@@ -165,7 +165,7 @@ def is_pose(value: Any) -> bool:
 
 
 def body_of(topic: str, answers: Answers) -> str:
-    """Return the name of a body that its messages do not name: that of --frames, else the topic."""
+    """Return the name of the body for messages that do not name it: that of --frames, else the topic."""
     return answers.frames[-1] if answers.frames else topic.strip("/") or "body"
 
 
@@ -179,14 +179,14 @@ def _read_timestamp(value: Any) -> int:
 
 
 def only(mapping: dict[str, Any], known: tuple[str, ...]) -> None:
-    """Refuse unknown keys."""
+    """Raise Misfit for unknown keys."""
     for key in mapping:
         if key not in known:
             raise Misfit(f"unknown key {shown(key)}; expected {', '.join(known)}", (key,), key=True)
 
 
 def part(message: dict[str, Any], key: str, what: str) -> dict[str, Any]:
-    """Return a mapping inside a message; `what` lists the keys of the message, for errors."""
+    """Return a mapping inside a message; what: describes the keys of the message, for errors."""
     if key not in message:
         raise Misfit(f"missing {key}; {what}")
     inner: dict[str, Any] = within((key,), as_mapping, message[key], f"{key} as a mapping")
@@ -203,7 +203,7 @@ def frame_of(mapping: dict[str, Any], key: str, path: Path, reading: Reading) ->
 
 
 def header_stamp(header: Any) -> int | None:
-    """Read the stamp of a header as nanoseconds; None if there is none."""
+    """Read the stamp of a header as nanoseconds; None for a header without a stamp."""
     if type(header) is not dict or "stamp" not in header:
         return None
     stamp_ns: int = within(("header", "stamp"), read_stamp, header["stamp"])
@@ -226,7 +226,7 @@ def read_stamp(value: Any) -> int:
 
 
 def stamp_problem(seconds: int, nanoseconds: int, names: tuple[str, str]) -> Misfit | None:
-    """Return the error for a stamp that no message can hold."""
+    """Return the error for a stamp that no message can hold, None for a valid one."""
     allowed = SECONDS[names[0]]
     if seconds not in allowed:
         return Misfit(f"{names[0]} {seconds} is beyond {allowed[0]} .. {allowed[-1]}", (names[0],))
@@ -236,7 +236,7 @@ def stamp_problem(seconds: int, nanoseconds: int, names: tuple[str, str]) -> Mis
 
 
 def whole_list(value: Any, what: str) -> list[Any]:
-    """Return a value that must be a complete list; the tools truncate long ones by default."""
+    """Return a value if it is a complete list; raises Misfit for others and for lists that a tool has truncated."""
     if type(value) is str and re.fullmatch(_LEFT_OUT, value):
         raise Misfit(f"the numbers are not there, only {shown(value)}: record without --no-arr (--noarr)")
     if type(value) is not list:
@@ -247,7 +247,7 @@ def whole_list(value: Any, what: str) -> list[Any]:
 
 
 def read_rigid(mapping: dict[str, Any], keys: tuple[str, str], reading: Reading) -> tuple[Vector, Quaternion]:
-    """Read position and rotation under the keys of a kind of message."""
+    """Read the position and the rotation under the keys of a kind of message."""
     for key in keys:
         if key not in mapping:
             raise Misfit(f"missing {key}")
@@ -282,7 +282,7 @@ def positions(value: dict[str, Any]) -> Iterator[tuple[str, Any, Path]]:
 
 
 def position_of(joint: str, value: Any) -> Path | None:
-    """Return the path to the position of a joint in a JointState; None for anything else, or without such a joint."""
+    """Return the path to the position of a joint in a JointState; None without this joint, or for other values."""
     if type(value) is not dict or type(value.get("name")) is not list or joint not in value["name"]:
         return None
     index = value["name"].index(joint)
@@ -290,7 +290,7 @@ def position_of(joint: str, value: Any) -> Path | None:
     return ("position", index) if type(listed) is list and index < len(listed) else None
 
 
-# what the tools or the shell print between messages; only the warning about lost messages ends a document
+# lines that the tools or the shell print between messages; only the warning about lost messages ends a document
 is_noise = partial(
     re.fullmatch,
     r"""(?x) \ufeff? (?:
@@ -304,7 +304,7 @@ _NOISE_START = r"(?m)^(?=[A-Z\t\[\d$^\ufeff])"  # no key that ROS prints begins 
 
 
 def without_noise(text: str, line: int = 0, tally: Diagnostics | None = None) -> str:
-    """Blank the lines that are known not to be data, and record them; positions in the text are preserved."""
+    """Replace lines that are known not to be data by blanks, and record them; positions in the text are preserved."""
     if re.search(_NOISE_START, text) is None:
         return text
     kept = text.split("\n")
@@ -320,12 +320,12 @@ def without_noise(text: str, line: int = 0, tally: Diagnostics | None = None) ->
 
 
 def write_poses(results: Iterable[Result], style: Style) -> str:
-    """Return a message for each pose; frames without a name are "", an unknown stamp is 0."""
+    """Return a message for each pose; a frame without a name is "", an unknown stamp is 0."""
     return "".join(message_text(transform_stamped(result, style), style) for result in results)
 
 
 def write_points(records: Iterable[dict[str, Any]], style: Style) -> str:
-    """Return PointStamped and Vector3Stamped messages; messages are unchanged."""
+    """Return PointStamped and Vector3Stamped messages; records that are messages are unchanged."""
     made = []
     for record in records:
         inner = next((value for value in record.values() if isinstance(value, (list, dict))), record)
@@ -339,7 +339,7 @@ def write_points(records: Iterable[dict[str, Any]], style: Style) -> str:
 
 
 def write_tree(tree: FrameTree, style: Style) -> str:
-    """Return one message with every edge, as in a latched /tf_static."""
+    """Return one message with all edges, as in a latched /tf_static."""
     return message_text({"transforms": [transform_stamped(edge, style) for edge in edge_results(tree)]}, style)
 
 
@@ -351,7 +351,7 @@ def message_text(message: dict[str, Any], style: Style) -> str:
 
 
 def _respelled(value: Any, fmt: str) -> Any:
-    """Convert the headers and stamps of a message to the other ROS version."""
+    """Convert the headers and stamps of a message to the ROS version of a format."""
     if isinstance(value, list):
         return [_respelled(each, fmt) for each in value]
     if not isinstance(value, dict):
@@ -382,7 +382,7 @@ def transform_stamped(result: Result, style: Style) -> dict[str, Any]:
 
 
 def new_header(frame: str | None, stamp_ns: int | None, style: Style) -> dict[str, Any]:
-    """Return a header; ROS 1 numbers its messages."""
+    """Return a header; in ROS 1 it has a counter, 0."""
     first = {"seq": 0} if style.format == "ros1" else {}
     return first | {"stamp": new_stamp(stamp_ns or 0, style.format), "frame_id": frame or ""}
 
@@ -397,7 +397,10 @@ def new_stamp(stamp_ns: int, fmt: str) -> dict[str, int]:
 
 
 def _lines(mapping: dict[str, Any], style: Style, indent: str = "") -> Iterator[str]:
-    """Write block style as PyYAML does for ROS 2, as genpy does for ROS 1, where a list of numbers is one line."""
+    """Yield the lines of a mapping in block style, as PyYAML writes for ROS 2 and genpy for ROS 1.
+
+    In ROS 1 a list of numbers is one line.
+    """
     is_ros1 = style.format == "ros1"
     opening = ": " if is_ros1 else ":"
     for key, value in mapping.items():
@@ -406,7 +409,7 @@ def _lines(mapping: dict[str, Any], style: Style, indent: str = "") -> Iterator[
             yield from _lines(value, style, indent + "  ")
         elif isinstance(value, list) and (any(isinstance(item, dict) for item in value) if is_ros1 else value):
             yield f"{indent}{key}{opening}"
-            for item in value:  # in ROS 2 in the column of its key and the dash before it, in ROS 1 below the dash
+            for item in value:  # ROS 2: the dash is in the column of the key; ROS 1: the item is below the dash
                 if is_ros1:
                     yield f"{indent}  - "
                     yield from _lines(item, style, indent + "    ")

@@ -74,9 +74,9 @@ def may_be_pasted(text: str) -> bool:
 def in_grammar(
     source: Source, default: Notation | None = None, *, normalize: bool = False, points: bool = False
 ) -> Source | None:
-    """Return a pasted text as text of the grammar, one value per line; None for other text, or if it already is.
+    """Return a pasted text as text of the grammar of poses, one value per line; None for text that needs no change.
 
-    default: the notation of numbers that do not state theirs; normalize: accept any non-zero quaternion
+    default: the representation of numbers that do not state theirs; normalize: accept any non-zero quaternion
     points: three numbers are a point
     Raises FormatError for a known print that cannot be read.
     """
@@ -100,7 +100,7 @@ def in_grammar(
 
 
 def _unless_grammar(source: Source, default: Notation | None, *, points: bool) -> list[Any] | None:
-    """Return the values of pasted numbers; for JSON only those that the grammar would refuse."""
+    """Return the values of pasted numbers; None for JSON that the grammar accepts."""
     read = parse_json(source)
     lists = (each for each in read or () if type(each) is list and each and type(each[0]) is list)
     has_matrix = any((len(each), len(each[0])) in ((3, 3), (4, 4)) for each in lists)
@@ -115,7 +115,7 @@ def _unless_grammar(source: Source, default: Notation | None, *, points: bool) -
 
 
 def _blocks(text: str) -> list[Any]:
-    """Read all blocks printed by tf2_echo; position and time may be missing, and the first rotation is used."""
+    """Read all blocks printed by tf2_echo; position and time may be missing, and the first rotation of each is used."""
     names, values, stamp = _HEADING.search(text), list[dict[str, Any]](), 0
     known = {"name": names[1], "parent": names[2]} if names else {}
     for part in _PART.finditer(text):

@@ -41,9 +41,9 @@ _FORMS = "x y z qx qy qz qw PARENT CHILD, or x y z yaw pitch roll PARENT CHILD"
 
 
 def write_poses(results: Iterable[Result], style: Style) -> str:
-    """Return one line per pose; it must name both frames, and no frame may have two poses.
+    """Return one line per pose.
 
-    Raises ValueInvalid.
+    Raises ValueInvalid if a pose does not name both frames, if names cannot be read back, or if a frame has two poses.
     """
     from shlex import quote
 
@@ -70,7 +70,7 @@ def write_poses(results: Iterable[Result], style: Style) -> str:
 
 
 def moving_frames(names: Iterable[str]) -> str:
-    """Return the error that frames have more than one pose."""
+    """Return the message that frames have more than one pose."""
     return f"frames move and cannot be published as static: {', '.join(names)}"
 
 
@@ -82,7 +82,7 @@ def write_tree(tree: Frames, style: Style) -> str:
 def read(file: InputFile, options: Options) -> Iterator[Edge]:
     """Yield the pose that each line publishes; a line that ends in a backslash continues in the next.
 
-    Other lines of a script that calls the tool are skipped and counted.
+    Other lines of a script that calls the tool are skipped, with a warning.
     """
     line, others, in_script = 1, dict[int, str](), CALL in file.text
     for call in re.findall(r"(?:[ \t]*#.*|(?:.*\\\n)*.*)(?:\n|\Z)", re.sub("\r\n?", "\n", file.text)):
@@ -100,7 +100,7 @@ def read(file: InputFile, options: Options) -> Iterator[Edge]:
 def read_edge(
     arguments: str | Sequence[str], file: InputFile, options: Options, line: int, column: int = 0
 ) -> Edge | None:
-    """Read the arguments of one call, a line or its words; None if they are wrong and reading continues."""
+    """Read the arguments of one call, a line or its words; None if they are invalid and the error is only reported."""
     reading = Reading(Source(file.name, ""), normalize=options.normalize)
     try:
         pose = read_call(arguments, reading) if isinstance(arguments, str) else read_words(arguments, reading)
@@ -129,7 +129,7 @@ def read_call(line: str, reading: Reading) -> Pose:
 
 
 def read_words(words: Sequence[str], reading: Reading) -> Pose:
-    """Read one call from its words, without those before the tool's name and those for ROS itself.
+    """Read one call from its words; those before the tool's name, and those for ROS itself, are ignored.
 
     Its numbers have no units.
     Raises ValueInvalid.
@@ -179,7 +179,7 @@ def read_flags(flags: dict[str, str], reading: Reading) -> Pose:
 
 
 def read_positional(words: Sequence[str], reading: Reading) -> Pose:
-    """Read the old syntax: 8 or 9 words, with an optional period in ms; a numeric seventh means a quaternion."""
+    """Read the old syntax: 8 or 9 words, and an optional period in ms; a numeric seventh word means a quaternion."""
     names = WITH_ANGLES if len(words) >= 7 and not _NUMBER.match(words[6]) else WITH_QUATERNION
     if len(words) not in (len(names), len(names) + 1):
         raise ValueInvalid(f"{CALL} takes {_FORMS}; found {len(words)} words")
