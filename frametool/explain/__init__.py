@@ -1,6 +1,6 @@
 """Derivations of results, step by step with the numbers of a run, as text or Markdown.
 
-The package is callable: `frametool.explain(..)` is that of `frametool.sim.followed`, also where this room was imported.
+The package is callable, because it has the name of the function `frametool.explain` of `frametool.sim.followed`.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from typing import Any
 
 
 class CallableRoom(ModuleType):
-    """A package that can be called: it runs the public function of its name."""
+    """A callable package: a call runs the public function of the same name."""
 
     def __call__(self, *arguments: Any, **options: Any) -> Any:
         """Call the function."""

@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     Edge = tuple[str, str, Rigid]  # parent, child, parent_from_child
 
 ANGLES, ROLL_PITCH_YAW, ROTATION = "a1 a2 a3", "roll pitch yaw", " ".join(ENTRIES)
-BLOCKS = {  # the names of a representation's numbers in its two sheets, as written and as found
+BLOCKS = {  # names of a representation's numbers in its two sheets: to the quaternion, and from it
     "quaternion": ("x y z w", "x y z w"),
     "xyzw": ("x y z w", "x y z w"),
     "wxyz": ("w x y z", "w x y z"),
@@ -58,7 +58,10 @@ PLAIN = ("quaternion", "xyzw")
 
 
 def names_of(notation: Notation, found: int, *, degrees: bool) -> list[str]:
-    """Return the names of a notation's numbers, as written or as found; raises ValueInvalid if it has no sheets."""
+    """Return the names of a representation's numbers; raises ValueInvalid if it has no sheets.
+
+    found: 0 for the sheet to the quaternion, 1 for the sheet from it
+    """
     representation = notation.representation
     if representation.name not in BLOCKS:
         raise ValueInvalid(f"there is no derivation of {shown(representation.name)}; derived are {', '.join(BLOCKS)}")
@@ -67,7 +70,7 @@ def names_of(notation: Notation, found: int, *, degrees: bool) -> list[str]:
 
 
 def _words(notation: Notation, values: Values, *, degrees: bool) -> dict[str, str]:
-    """Return the words of a notation for its two sheets; add the kind of its axes to the values."""
+    """Return the words for the sheets of a representation; add the properties of its Euler axes to the values."""
     words = {"deg": "_deg" * degrees, "unit": "deg" if degrees else "rad"}
     if (name := notation.representation.name) not in ("euler", *AXES_OF):
         return words
@@ -82,7 +85,7 @@ def _words(notation: Notation, values: Values, *, degrees: bool) -> dict[str, st
 
 
 def to_quaternion(sheet: Sheet, numbers: Sequence[float], notation: Notation, *, degrees: bool) -> Quaternion:
-    """Add the derivation of the quaternion from the numbers of a notation."""
+    """Add the derivation of the quaternion from the numbers of a representation; return the quaternion."""
     values: Values = dict(zip(names_of(notation, 0, degrees=degrees), numbers, strict=True))
     words = _words(notation, values, degrees=degrees)
     sheet.play(f"{notation.representation.name} to", values, **words)
@@ -92,7 +95,7 @@ def to_quaternion(sheet: Sheet, numbers: Sequence[float], notation: Notation, *,
 def from_quaternion(
     sheet: Sheet, q: Quaternion, notation: Notation, *, degrees: bool, keep_sign: bool
 ) -> Sequence[float]:
-    """Add the derivation of a notation from the quaternion; return its numbers."""
+    """Add the derivation of a representation from the quaternion; return its numbers."""
     names, (x, y, z, w) = names_of(notation, 1, degrees=degrees), q
     values = named("", q) | {"degrees": float(degrees), "negative": float((w or x or y or z) < 0.0)}
     values["signed"] = 0.0 if keep_sign else values["negative"]
@@ -106,7 +109,7 @@ def from_quaternion(
 
 
 def named(prefix: str, numbers: Sequence[float]) -> Values:
-    """Return the numbers of a vector or a quaternion by name."""
+    """Return the numbers of a vector or a quaternion by name: the prefix with x, y, z, w."""
     return {f"{prefix}{name}": number for name, number in zip("xyzw", numbers, strict=False)}
 
 
@@ -123,18 +126,18 @@ def pose_of(values: Values, letter: str = "") -> Rigid:
 
 
 def product(sheet: Sheet, a: Rigid, b: Rigid, frames: tuple[str, str, str]) -> Rigid:
-    """Multiply two poses: `frames` are those of a_from_b and b_from_c, in this order."""
+    """Add the product of two poses and return it; frames: those of a_from_b and b_from_c, in this order."""
     words = dict(zip(("first", "middle", "last"), frames, strict=True))
     return pose_of(sheet.play("compose", posed("a", a) | posed("b", b), **words), "c")
 
 
 def inverse(sheet: Sheet, pose: Rigid, target: str, source: str) -> Rigid:
-    """Invert target_from_source."""
+    """Add the inverse of target_from_source and return it."""
     return pose_of(sheet.play("inverse", posed("", pose), target=target, source=source))
 
 
 def between(sheet: Sheet, a: Rigid, b: Rigid, *, fraction: float) -> Rigid:
-    """Interpolate two poses: linearly and by slerp."""
+    """Add the interpolation of two poses, linear and by slerp, and return the result."""
     sheet.stretch = max(sheet.stretch, abs(fraction))
     line = sheet.play("line", {"f": fraction} | named("a", a[:3]) | named("b", b[:3]))
     arc = sheet.play("slerp", {"f": fraction} | named("a", a[3:]) | named("b", b[3:]))
@@ -142,7 +145,7 @@ def between(sheet: Sheet, a: Rigid, b: Rigid, *, fraction: float) -> Rigid:
 
 
 def moved(sheet: Sheet, kind: str, pose: Rigid, numbers: Sequence[float], target: str, source: str) -> Vector:
-    """Transform a point or a vector from one frame to another."""
+    """Add the transform of a point or a vector to another frame, and return the result."""
     values = named("t", pose[:3]) | named("q", pose[3:]) | named(kind[0], numbers)
     sheet.play(kind, values, target=target, source=source)
     x, y, z = (values[kind[0] + each] for each in "xyz")
@@ -150,7 +153,11 @@ def moved(sheet: Sheet, kind: str, pose: Rigid, numbers: Sequence[float], target
 
 
 class OtherAxes(NamedTuple):
-    """A change of axes: the names and rotations of its sides, None if unchanged, and whether it is a reflection."""
+    """A change of axes.
+
+    world, axes: name and rotation of the change on the left and on the right of the pose, None if unchanged
+    mirrors: True if it is a reflection
+    """
 
     world: tuple[str, Quaternion] | None = None
     axes: tuple[str, Quaternion] | None = None
@@ -161,10 +168,10 @@ class WrittenPose(NamedTuple):
     """A pose as it was written.
 
     pose: its value, as every command reads it
-    notation: that of its rotation; None if there is none
-    numbers: of the rotation, in column order; degrees: whether its angles are degrees
+    notation: representation of its rotation; None without a rotation
+    numbers: of the rotation, in column order; degrees: True if its angles are degrees
     position: x, y, z in metres as written, before `inverse: true`
-    inverse: whether the inverse was written
+    inverse: True if the inverse was written
     """
 
     pose: Pose
@@ -257,9 +264,9 @@ def _named(parent: str, child: str) -> str:
 
 
 def _edge(sheet: Sheet, track: Track, at_ns: int) -> Edge:
-    """Return an edge at a time, with its steps if it moves.
+    """Return an edge at a time, and add its derivation if it moves.
 
-    It is between the last sample that is not after the time, else the first one, and the next one, if there is one.
+    The time is between the last sample that is not after it (else the first sample) and the next sample, if any.
     """
     parent, child = printable(track.parent), printable(track.child)
     if track.is_static:
@@ -289,7 +296,7 @@ def spans(begin_ns: int, end_ns: int, at_ns: int) -> Values:
 
 
 def _joined(sheet: Sheet, to_target: list[Edge], to_source: list[Edge]) -> Rigid:
-    """Multiply both branches, topmost edges first, and join them; without one to the target nothing is inverted."""
+    """Multiply both branches, topmost edges first, and join them; an empty branch to the target is not inverted."""
     products = []
     for edges in filter(None, (to_target, to_source)):
         top, here, pose = edges[0]
@@ -315,8 +322,9 @@ class DerivationWrong(FrametoolError):
 
 
 def explained(style: Style, title: str, write: Callable[[Sheet], None]) -> Explanation:
-    """Write a derivation; if rounding errors shown as 0 lead too far away, as near singular numbers, without that.
+    """Return the derivation that `write` adds to a sheet.
 
+    Rounding errors are shown as 0, unless that leads too far from the result, as with nearly singular numbers.
     style: its precision counts significant digits here, None for all
     """
     for clean in dict.fromkeys((style.precision is not None, False)):
@@ -331,14 +339,17 @@ def explained(style: Style, title: str, write: Callable[[Sheet], None]) -> Expla
 
 
 def derived_pose(style: Style, title: str, own: Result, way: Callable[[Sheet], Rigid]) -> Explanation:
-    """Write the derivation of a pose, then of its notations; `own` is the command's result."""
+    """Return the derivation of a pose and of its representations.
+
+    own: the command's result; way: adds the derivation of the pose to a sheet and returns it
+    """
     return explained(style, title, lambda sheet: end_with_pose(sheet, way(sheet), own, style))
 
 
 def end_with_pose(sheet: Sheet, derived: Rigid, own: Result, style: Style) -> None:
-    """Continue from the quaternion to the requested notations, check them, and end with the command's own result.
+    """Add the derivation of the requested representations, check them, and end with the command's own result.
 
-    Numbers of a notation are compared as rotations, also near gimbal lock.
+    Numbers are compared as rotations, also near gimbal lock.  Raises DerivationWrong.
     """
     pose = own.pose
     rows: list[Row] = []

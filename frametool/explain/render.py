@@ -38,7 +38,7 @@ def _wrapped(text: str, first: str, further: str) -> list[str]:
 def equals(
     step: SheetStep, write: Callable[..., str], name: Callable[[str], str], number: Callable[[str], str]
 ) -> list[str]:
-    """Return what a step's name equals: its formula, the same with numbers, its value.
+    """Return the sides of a step's equation: its formula, the formula with numbers, its value.
 
     write, name, number: format a tree, a name and a number's text
     """
@@ -47,7 +47,7 @@ def equals(
 
 
 def _steps(steps: Sequence[SheetStep]) -> Iterator[str]:
-    """Write successive steps with their signs of equality below one another.
+    """Yield the lines of successive steps, with their signs of equality below one another.
 
     A long formula is broken before its plus and minus signs, or before a product.
     """
@@ -72,7 +72,7 @@ def _steps(steps: Sequence[SheetStep]) -> Iterator[str]:
 
 
 def _grid(grid: MatrixLine) -> list[str]:
-    """Write matrices side by side, as many as fit."""
+    """Return the lines of matrices side by side, as many as fit."""
     lines = [f"{INDENT}{grid.name} = {grid.text}"] if grid.text else []
     head = f"{INDENT}{' ' * len(grid.name) if grid.text else grid.name} = "
     groups: list[list[str]] = []
@@ -96,13 +96,13 @@ def _grid(grid: MatrixLine) -> list[str]:
 
 
 def _side_by_side(left: str, block: Sequence[str], right: str = "") -> list[str]:
-    """Add words to the left and to the right of the middle row of a block."""
+    """Return a block with words at the left and at the right of its middle row."""
     before, behind, middle = " " * len(left), " " * len(right), len(block) // 2
     return [left + row + right if at == middle else before + row + behind for at, row in enumerate(block)]
 
 
 def result_lines(rows: Sequence[run.Row]) -> list[str]:
-    """Write the result: one line per notation, or per number if that is too long."""
+    """Return the lines of the result: one per representation, or per number if that is too long."""
     width = max((len(row.label) for row in rows), default=0)
     lines = []
     for row in rows:

@@ -37,7 +37,7 @@ DIGITS = 6  # default of significant digits
 TOO_LARGE = "the numbers are too large or too small for a derivation: a step is not finite"
 MATRIX_STEP = re.compile(r"(-?)R(?:\((\w)\))?(\^T)? (\w+)(?: \+ (\w+))?")  # R(q) of qx .. qw, R of x y z w
 STEP = re.compile(r"(\S+) = (.*?)(?:  \[(.*)\])?")
-NOISE = 2e-15  # of the larger term: what the rounding of a few terms leaves where they cancel
+NOISE = 2e-15  # share of the larger term that the rounding of a few terms leaves where they cancel
 FAR = 16.0  # radians: a larger angle is as written, not a multiple of a rounded pi
 SUM, PRODUCT, SIGN, POWER = 1, 2, 3, 4  # precedence of operators
 # operator -> precedence, text, function
@@ -217,7 +217,7 @@ class Sheet:
         return cleaned(number, self.noise, size) + 0.0
 
     def heading(self, text: str) -> None:
-        """Begin a part."""
+        """Begin a numbered part."""
         self._headings += 1
         self.items.append(Words(HEADING, f"{self._headings}. {self._about}{text}"))
 
@@ -242,7 +242,7 @@ class Sheet:
             self.items.append(Words(CAVEAT, text))
 
     def play(self, name: str, values: Values, /, **words: Any) -> Values:
-        """Add a sheet, and return the values of its steps too: `values` with the new names."""
+        """Add the lines of a sheet; return `values` with the values of its steps."""
         self._play(sheets()[name], values, words)
         return values
 
@@ -381,7 +381,7 @@ WRITERS: dict[str, Callable[[Sheet, str], None]] = {
 
 
 def _for_each(line: str) -> Sequence[str]:
-    """Repeat a line for each name in place of % or $; helper functions take names of vectors unchanged."""
+    """Return a line for each name in place of % or $; helper functions take names of vectors unchanged."""
     if line[0] in WRITERS:
         return [line]
     text, _, letters = line.partition("  for ")

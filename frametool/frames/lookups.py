@@ -40,7 +40,7 @@ if TYPE_CHECKING:
     from frametool.geometry import Components, Rigid
     from frametool.geometry.camera import Camera
 
-MOST_KEPT = 1 << 14  # queries
+MOST_KEPT = 1 << 14  # queries in the cache
 
 
 class Frames:
@@ -49,7 +49,7 @@ class Frames:
     Times are integer nanoseconds; None is the latest.  Static frames have the same pose at all times.
     """
 
-    moves: bool  # whether any frame does
+    moves: bool  # True if any frame moves
     at_ns: int | None = None  # the time of a tree that was extracted from moving frames
 
     cameras: Mapping[str, Camera] = MappingProxyType({})  # by frame, from `camera:` entries
@@ -215,8 +215,9 @@ class Frames:
     def carried(
         self, target: str, source: str, at_ns: int | None, sample: Callable[[Track], Rigid | None] | None = None
     ) -> Components:
-        """Return the entries of `covariance` at a time (None if nothing moves) that has data; zeros for no edge.
+        """Return the 36 entries of `covariance`; zeros if there is no edge between the frames.
 
+        at_ns: a time with data, None if nothing moves
         sample: finds the poses of the edges, floats or columns, instead of those at that time
         """
         sample = sample or methodcaller("at", whole_stamp(at_ns or 0))
@@ -334,7 +335,7 @@ class Frames:
         return query
 
     def path_at(self, target: str, source: str, at_ns: int) -> FramePath | None:
-        """Return the path as `between` does; None if a changing parent leaves none."""
+        """Return the path as `between` does; None if the frames are not connected, or have no data, at that time."""
         try:
             return self.between(target, source, at_ns)
         except (NoDataAt, NotConnected):
@@ -359,7 +360,10 @@ class Frames:
             return path_between(target, source, parent)  # of the edges that have data then
 
     def _parent_near(self, child: str, at_ns: int, *, is_covered: bool = False) -> str | None:
-        """Return the parent of a frame at a time, or nearest to it, unless that has to be covered; None for none."""
+        """Return the parent of a frame at a time, or at the nearest sample; None for a root.
+
+        is_covered: also return None if the time is outside of the samples
+        """
         track = self._tracks.get(child)
         return track.parent_near(at_ns) if track and (track.covers(at_ns) or not is_covered) else None
 
@@ -440,8 +444,8 @@ class FrameTree(Frames):
     def near(self, target: str, source: str) -> Rigid:
         """Return target_from_source of two frames that exist.
 
-        Both ways up are climbed in turn until they meet: neighbours deep in a long chain cost no more than others.
-        Raises NotConnected.
+        Climbs from both frames in turn until the paths meet, so that neighbours deep in a long chain cost no more than
+        others.  Raises NotConnected.
         """
         if self.groups.of(target) != self.groups.of(source):
             self.between(target, source, None)  # raises
@@ -481,7 +485,10 @@ def checked_rate(rate_hz: float) -> float:
 
 
 def taken(transform: Transform, covariance: Any) -> tuple[Rigid, Components]:
-    """Return the components of one transform and the checked entries of its covariance; () for None."""
+    """Return the components of a transform, and the checked entries of its covariance, () for None.
+
+    Raises ValueInvalid.
+    """
     if not isinstance(transform, Transform) or (type(transform.components[6]) is not float and transform.shape):
         raise ValueInvalid(f"the pose of a frame is one Transform, found {transform!r}")
     if covariance is None:

@@ -31,10 +31,7 @@ class NotATime(ValueInvalid):
 
 
 def whole_stamp(stamp_ns: Any) -> int:
-    """Check a stamp: an integer, never a float.
-
-    Raises ValueInvalid.
-    """
+    """Return a stamp as an integer; raises ValueInvalid for a float, and for a stamp beyond the year 2116."""
     try:
         stamp = index(stamp_ns)
     except TypeError:
@@ -102,9 +99,9 @@ def parse_times(text: str) -> Sequence[int]:
 
 
 def nanoseconds_each(whole: Any) -> Any:
-    """Return the nanoseconds per unit of an integer, or of each element of an array, whose unit is not stated.
+    """Return the nanoseconds per unit of an integer, or of each element of an array, inferred from its size.
 
-    A billion (seconds), unless a smaller unit makes it a time between the years 2000 and 2100 and seconds do not.
+    Units are seconds, unless in a smaller unit the number is a time between the years 2000 and 2100.
     """
     sizes = (size for size in SUFFIXES if size != BILLION)
     return BILLION + sum(
@@ -154,9 +151,9 @@ def read_header_stamp(seconds: str, nanoseconds: str) -> int:
 
 
 def read_stamp(text: str, *, in_ns: int) -> int:
-    """Read a cell as nanoseconds, quotes and blanks around it left out; raises ValueInvalid.
+    """Parse a cell to nanoseconds, ignoring quotes and blanks around it; raises ValueInvalid.
 
-    in_ns: how many a whole number is, by its name; 0 are seconds, or what its size says
+    in_ns: nanoseconds per unit, as the column's name states; 0: seconds, or the unit that a whole number's size implies
     """
     bare = text.strip(" \t\"'")
     if in_ns and not bare.endswith("ns"):
@@ -178,7 +175,7 @@ def read_stamp(text: str, *, in_ns: int) -> int:
 
 
 def stamp_text(written: str, stamp_ns: int, *, in_ns: int) -> str:
-    """Write another stamp as one was written: whole units as such, seconds with no fewer decimals."""
+    """Format a stamp in the notation of `written`: whole units, or seconds with at least as many decimals."""
     bare = written.strip()
     if bare.endswith("ns"):
         return f"{stamp_ns}ns"

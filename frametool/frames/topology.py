@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from frametool.geometry import Components, Rigid
 
 MOST_SHOWN = 16  # frames of a path or a cycle
-OTHER_CLOCK = 10**8 * BILLION  # three years: where only one of two times is below, only the other counts from 1970
+OTHER_CLOCK = 10**8 * BILLION  # three years: if only one of two times is smaller, only the other counts from 1970
 
 
 Member = TypeVar("Member", bound=Hashable)
@@ -129,7 +129,7 @@ def path_between(target: str, source: str, parent_of: Callable[[str], str | None
 
 
 def check_same(child: str, known: tuple[str, Rigid], found: tuple[str, Rigid]) -> None:
-    """Refuse another parent or pose of a static frame; both are (parent, components)."""
+    """Raise BadTopology for another parent or pose of a static frame; known, found: (parent, components)."""
     if found[0] != known[0]:
         raise two_parents(child, known[0], found[0])
     if found[1] != known[1]:
@@ -253,7 +253,7 @@ class Query:
 
     fixed: the result, if nothing on the path moves; otherwise None
     moving: the edges that move
-    far: whether the common ancestor is the Earth
+    far: True if the common ancestor is the Earth
     """
 
     __slots__ = ("far", "fixed", "moving", "to_source", "to_target")
@@ -273,7 +273,7 @@ class Query:
         self.fixed = None if self.moving else self.compose(attrgetter("components"))
 
     def compose(self, sample: Callable[[Track], Rigid | None]) -> Rigid | None:
-        """Return target_from_source for the poses that `sample` finds for the edges, floats or columns; None without.
+        """Return target_from_source from the poses that `sample` finds, floats or columns; None if one is missing.
 
         An empty branch does not change the bits of the other.
         """

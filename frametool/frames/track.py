@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
     Way: TypeAlias = tuple[float, float, float, float, float, float, float, float]
 
-MANY = 1 << 13  # from this many samples per call on they are packed
+MANY = 1 << 13  # number of samples above which `extend` packs them
 FEW = 64  # late samples: up to this many are inserted one by one, which is cheaper than a sort
 
 
@@ -108,7 +108,7 @@ class MovingTrack:
         self.varies = False
         self.stamps, self.parents = [stamp_ns], [parent]
         self.samples = [components]  # or Packed, which behaves like such a list
-        self.begin = 0  # the index of the oldest sample: those before it were dropped, or are room for older ones
+        self.begin = 0  # index of the oldest sample; items before it were dropped, or are room for older samples
         self.late: dict[int, tuple[str, Rigid]] = {}
         self.segments: dict[int, Way] = {}  # by the stamp at which they begin
         self.first_ns = self.last_ns = stamp_ns
@@ -167,7 +167,7 @@ class MovingTrack:
         self.last_ns = stamp_ns
 
     def has(self, stamp_ns: int) -> bool:
-        """Return True if there is a sample at a stamp; late samples stay where they are, which costs less."""
+        """Return True if there is a sample at a stamp; late samples are not inserted for this, which costs more."""
         if stamp_ns > self.last_ns:
             return False
         return stamp_ns in self.late or self.stamps[bisect_left(self.stamps, stamp_ns, self.begin)] == stamp_ns
@@ -205,13 +205,13 @@ class MovingTrack:
         self.late.clear()
 
     def _place(self, at_ns: int) -> int:
-        """Return the index of the newest sample that is not after a time; `begin` - 1 if there is none."""
+        """Return the index of the newest sample that is not after a time; `begin` - 1 if all are after it."""
         if self.late:
             self._settle()
         return bisect_right(self.stamps, at_ns, self.begin) - 1
 
     def sample_at(self, stamp_ns: int) -> tuple[str, Rigid]:
-        """Return parent and components at a stamp that there is."""
+        """Return parent and components of the sample at an existing stamp."""
         at = self._place(stamp_ns)
         return self.parents[at], self.samples[at]
 
@@ -229,7 +229,7 @@ class MovingTrack:
             self.varies = any(True for _ in self.changes())
 
     def drop_before(self, stamp_ns: int) -> None:
-        """Drop the samples older than a stamp, but never the newest; half of the lists goes at once."""
+        """Drop samples older than a stamp, but never the newest; the lists are shortened when half is dropped."""
         oldest = min(stamp_ns, self.last_ns)
         if oldest <= self.first_ns:
             return

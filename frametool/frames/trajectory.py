@@ -80,7 +80,7 @@ class Trajectory(NamedTuple):
         return self._replace(stamps_ns=np.arange(self.size, dtype=np.int64) * 1_000_000_000)
 
     def disorder(self, name: str) -> list[str]:
-        """Return what `in_order` changes in a trajectory with a name, one sentence each."""
+        """Return a sentence for each change that `in_order` makes; name: that of the trajectory."""
         stamps = np.array([], np.int64) if self.stamps_ns is None else self.stamps_ns
         doubled = int((np.diff(np.sort(stamps)) == 0).sum())
         said = [f"{name}: stamps are out of order; sorted"] * bool((np.diff(stamps) < 0).any())
@@ -110,7 +110,7 @@ def way(xyz: Array) -> Array:
 # --- lookups at many times ---
 
 
-SHARED = 4  # times per sample
+SHARED = 4  # times per sample from which on repeating samples is faster than indexing
 
 
 def lookup_many(frames: Frames, target: str, source: str, at_ns: Any, *, missing: str = "raise") -> Transform:
@@ -161,7 +161,7 @@ def as_stamps(at_ns: Any) -> Stamps:
 
 
 def _fill(out: Floats, query: Query, times: Stamps) -> None:
-    """Compute one interval block by block; NaN where an edge has no data."""
+    """Fill `out` (7, n) with the poses of a query at sorted times, block by block; NaN where an edge has no data."""
     if query.span is None:
         out[:] = np.array(query.fixed)[:, None]
         return
@@ -179,7 +179,10 @@ def _fill(out: Floats, query: Query, times: Stamps) -> None:
 
 
 def carried_many(frames: Frames, target: str, source: str, at_ns: Any, poses: Rigid) -> Floats:
-    """Return the covariance of target_from_source, 36 columns, at times whose poses were looked up; NaN as these."""
+    """Return the covariance of target_from_source at many times, (n, 36); NaN where `poses` are NaN.
+
+    poses: the results of lookups at these times
+    """
     times = as_stamps(at_ns)
     there = np.flatnonzero(~np.isnan(poses[6]))
     order = there[np.argsort(times[there], kind="stable")]

@@ -70,7 +70,7 @@ RULES = {
 }
 
 
-MOST_LINES = 5  # of the further places of a finding
+MOST_LINES = 5  # lines that are listed of the further places of a finding
 
 
 def level(finding: Finding) -> str:
@@ -151,12 +151,12 @@ class Statement(NamedTuple):
         return Finding(rule, message, self.source, self.line, self.column)
 
     def broken(self, error: BadTopology, places: str = "") -> Finding:
-        """Return the finding for edges that are not a tree."""
+        """Return the finding for an edge that breaks a rule of trees."""
         return self.finding(error.rule, error.message + places)
 
 
 def _read(file: FrameFile, find: Find, *, normalize: bool) -> Iterator[Statement]:
-    """Read everything that can be read from a file, and report errors; places in documents are searched once."""
+    """Yield the edges of a file, and report errors; places in documents are searched once."""
 
     def report(error: FormatError) -> None:
         find(error.finding)
@@ -193,7 +193,7 @@ def looks_w_first(components: Rigid) -> bool:
 
 
 def _read_tree(source: Source, find: Find, *, normalize: bool) -> list[tuple[Edge, bool]]:
-    """Read a tree: its edges, and whether each was written x, y, z, w with x = 1, as a quaternion, not as angles."""
+    """Return the edges of a tree, each with True if it was written as a quaternion x, y, z, w with x = 1."""
     documents = parse_documents(source.text, source.name)
     values = {each.index: each.value for each in documents}
     notes: list[Finding] = []
@@ -221,7 +221,7 @@ def check(
     """Return all findings in files, combined into one tree, in the order of the files and lines.
 
     tree: receives the static edges
-    others: allow files of other kinds; a file without frames only gets a finding that says so
+    others: allow files of unknown formats; such a file without frames gets only the finding no-frames
     """
     findings: list[Finding] = []
     findings += lint(_statements(files, findings, normalize=normalize, others=others), tree)
@@ -261,7 +261,7 @@ class Child(EdgeLog):
     """
 
     def __init__(self, first: Statement, number: int) -> None:
-        """Start before the first edge or sample; `number` counts all that were read."""
+        """Create the log of a frame before its first sample; number: that of the sample among all that were read."""
         super().__init__(first)
         self.first = self.newest = first
         self.irregular: dict[str, list[Statement]] = {}

@@ -253,7 +253,7 @@ class _Pair:
                     self.seen[frame] = each, apart._replace(rounding=ROUNDING * reach, turn_rounding=ROUNDING)
 
     def about(self, frame: str) -> Iterator[Difference]:
-        """Yield the differences of a common frame; `same` if there are none."""
+        """Yield the differences of a common frame, of kind `same` if it is unchanged."""
         parent_a, parent_b = self.a.parent(frame), self.b.parent(frame)
         blind = " and ".join(name for name, side in (("A", self.a), ("B", self.b)) if frame in side.without_data)
         start, seen = self.seen.get(frame, (None, None))

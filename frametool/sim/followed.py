@@ -135,7 +135,7 @@ def derive_follow(style: Style, steps: FollowStep | Sequence[FollowStep]) -> Exp
 def _derive(sheet: Sheet, step: FollowStep) -> None:
     """Add the position of the target in the follower's frame, as x and y, and the command for it.
 
-    Raises DerivationWrong if it is not the follower's.
+    Raises DerivationWrong if it differs from the follower's command.
     """
     frame = frame_of(step.follow.leader, step.follow.target)
     follower, leader, target = map(printable, (step.command.turtle, step.follow.leader, frame))
@@ -256,7 +256,7 @@ def _apply(style: Style, *operands: Any, at_ns: int | None = None, kind: str = "
     return derive_record(style, way, _source(record), RowOptions(kind=kind, degrees=degrees))
 
 
-OPERATIONS: dict[str, tuple[Callable[..., Explanation], int]] = {  # and how many of the operands are poses
+OPERATIONS: dict[str, tuple[Callable[..., Explanation], int]] = {  # derivation, number of first operands that are poses
     "convert": (derive.convert, 1), "compose": (derive.compose, sys.maxsize), "invert": (derive.invert, 1),
     "relative": (derive.relative, 2), "interpolate": (derive.interpolate, 2), "lookup": (derive.lookup, 0),
     "apply": (_apply, 0), "follow": (derive_follow, 0),

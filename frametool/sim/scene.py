@@ -133,7 +133,7 @@ FLAGS = {"true": "1", "false": "0"}  # as in turtlesim's services
 
 
 def known_keys(value: Any, keys: Collection[str], what: str) -> dict[str, Any]:
-    """Return a value that must be a mapping with some of these keys."""
+    """Return a value as a mapping; raises Misfit for other values and for unknown keys."""
     mapping = as_mapping(value, what)
     if unknown := [key for key in mapping if key not in keys]:
         known = alternatives(unknown[0], keys, "keys")
@@ -159,7 +159,7 @@ def _whole(text: str, most: int) -> int:
 
 
 CHOICES = {"turtlesim": drivers.VARIANTS, "law": (*drivers.LAWS,), "target": TARGETS}
-# key, also of a service's argument or a command -> how its text is read, and what it is; others are numbers
+# key, also of a service's argument or a command -> parser of its text, description; other keys are numbers
 READERS: dict[str, tuple[Callable[[str], Any], str]] = {
     "duration": (_duration, "a duration in seconds, or inf"),
     "seed": (partial(_whole, most=1 << 64), "a whole number"),
@@ -293,10 +293,10 @@ def timed_commands(
 
 
 def _pieces(lines: Iterable[str]) -> Iterator[tuple[Piece, bool]]:
-    """Split lines into pieces that can be read one by one, and yield whether each is a row of CSV, header included.
+    """Split lines into pieces that can be read one by one, each with True for a row of CSV, header included.
 
     The first line with data distinguishes CSV from documents and words.  A quoted cell may contain a line end.  A
-    document comes when the line that ends it has arrived, one of a single line at once.  Lines that the shell or the
+    document is yielded when the line that ends it has arrived, a single-line one at once.  Lines that the shell or the
     tools wrote between the messages are blanked.
     """
     is_table: bool | None = None
@@ -357,9 +357,9 @@ def _axes(value: Any, first: int, second: int) -> tuple[float, float]:
 
 
 def read_stream(stream: Any, name: str, *, period_ns: int = BILLION) -> Iterator[TimedTwist]:
-    """Read commands from a stream as they arrive; raises FormatError for bytes that are not text.
+    """Yield commands from a stream as they arrive; raises FormatError for bytes that are not text.
 
-    They are read past the buffer of standard input: Python aborts when it ends while a thread waits inside that.
+    The buffer of standard input is bypassed: Python aborts if it exits while a thread waits in it.
     """
     unbuffered: Any = SimpleNamespace(read1=stream.raw.read)
     lines = (line for piece in pieces_of_lines(unbuffered, name) for line in piece.text.splitlines())
@@ -449,7 +449,7 @@ def _leader(value: Any, source: Source, seed: int) -> MakeLeader:
 
 
 def _call(value: Any) -> ServiceCall:
-    """Read {t: .., SERVICE: {..}}; kill also takes only the name."""
+    """Read {t: .., SERVICE: {..}}; for kill the name alone is enough."""
     entry = known_keys(value, ("t", *SERVICES), "an event {t: .., SERVICE: {..}}")
     named = [key for key in entry if key != "t"]
     if "t" not in entry or len(named) != 1:

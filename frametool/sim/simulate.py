@@ -308,7 +308,7 @@ class RunSummary:
 
 
 def event_log(say: Callable[[str], None]) -> Watch:
-    """Return what reports what turtlesim and the followers log; a wall once for each contact."""
+    """Return a function that reports the messages of turtlesim and the followers in a step; a wall once per contact."""
     at_wall: set[str] = set()
 
     def watch(step: SimulationStep) -> None:
@@ -324,7 +324,7 @@ def event_log(say: Callable[[str], None]) -> Watch:
 
 FORMS = ("text", "yaml", "json", "csv")
 EMITS = ("commands", "poses", "tf")
-# of steps in text, whose lines must fit a terminal: millimetres and milliradians, with short names
+# names of columns in text, whose lines must fit a terminal
 SHORT = {
     "linear_x": "linear", "angular_z": "turning", "distance": "away",
     "leader_x": "lead_x", "leader_y": "lead_y", "leader_theta": "lead_th",
@@ -335,7 +335,7 @@ SHORT = {
 def step_writer(
     emit: str, style: Style, *, leaders: bool = False, labelled: bool = False
 ) -> Callable[[SimulationStep], Iterator[str]]:
-    """Return what yields each record of a step, the first one below the header if the format has one.
+    """Return a function that yields the records of a step as text, the first after a header if the format has one.
 
     emit: one of EMITS; style.format: one of FORMS.  leaders: the commands of leaders too, not only of followers.
     labelled: name the turtle in a comment of a YAML message.
@@ -376,7 +376,7 @@ def _aligned(texts: Record) -> str:
 def _emitted(
     step: SimulationStep, emit: str, style: Style, *, leaders: bool
 ) -> Iterator[tuple[Record, Record, Record]]:
-    """Yield the events of a step: cells by column, for text and CSV; the ROS message; what that does not say."""
+    """Yield the events of a step: cells by column, for text and CSV; the ROS message; fields that the message lacks."""
     t = step.t_ns / BILLION
     if emit == "tf":  # geometry_msgs/TransformStamped
         for stamp_ns, parent, child, transform in step.broadcasts:

@@ -52,10 +52,8 @@ class _Components(NamedTuple):
 class Twist(_Components):
     """A velocity command: metres and radians per second, in the turtle's own frame; x ahead, y to its left.
 
-    Raises:
-        ValueInvalid: a component is nan or infinite, or a rotation so fast that no heading is left; turtlesim would
-        accept
-            it and lose the turtle for good.
+    Raises ValueInvalid for a component that is nan or infinite, or a rotation so fast that no heading is left;
+    turtlesim would accept it and lose the turtle for good.
     """
 
     __slots__ = ()
@@ -102,10 +100,7 @@ def single(value: float) -> float:
 
 
 def check_single(**numbers: float) -> None:
-    """Refuse numbers that a message of float32 cannot hold.
-
-    Raises ValueInvalid, which names the first of them.
-    """
+    """Raise ValueInvalid for numbers that a message of float32 cannot hold; it names the first of them."""
     for name, value in numbers.items():
         if not math.isfinite(single(value)):
             raise ValueInvalid(f"{name} must be a number within float32, found {value:g}")
@@ -281,10 +276,7 @@ class World:
         return name
 
     def kill(self, name: str) -> None:
-        """Remove a turtle.
-
-        Raises ServiceRefused when there is none of that name.
-        """
+        """Remove a turtle; raises ServiceRefused if no turtle has this name."""
         if name not in self.turtles:
             raise ServiceRefused(f"Tried to kill turtle [{name}], which does not exist")
         del self.turtles[name]
@@ -425,7 +417,8 @@ HEADINGS = {key: Heading(math.radians(45.0 * number)) for number, key in enumera
 def arriving(commands: Iterable[tuple[int, Twist | Heading]]) -> MakeLeader:
     """Return a leader of commands that arrive during the simulation, read by a thread; each acts from its time on.
 
-    It looks for commands at every tick; the last one wins.  It raises what ended them, EndOfRun if somebody did.
+    It looks for commands at every tick; the last one wins.  If reading them fails it raises the error, EndOfRun if the
+    user ended the run.
     """
     from threading import Thread
 
@@ -555,7 +548,7 @@ ARROWS = {b"A": "up", b"B": "down", b"C": "right", b"D": "left"}
 
 
 def typed_commands(reads: Iterable[bytes], *, headings: bool) -> Iterator[tuple[int, Twist | Heading]]:
-    """Yield the commands of what is typed, other keys without any; raise EndOfRun at the key that ends it."""
+    """Yield (0, command) for each typed key; other keys are ignored.  Raises EndOfRun at a key that ends the run."""
     for key in chain.from_iterable(re.findall(rb"(?s)\x1b[\[O].|.", data) for data in reads):
         if key in b"qQ\x04":
             raise EndOfRun
