@@ -161,13 +161,13 @@ def opened(path: str | PathLike[str]) -> BufferedReader:
     try:
         for noted in _noted:
             noted[name] = states_of(name)
-        return BufferedReader(FileIO(path), HEAD)
+        return BufferedReader(FileIO(os.fspath(path)), HEAD)
     except OSError as error:
         called = name if 0 < len(name) <= LONGEST_NAME else shown(name)
         is_numbers = re.match(r".*(?:^|\s)[-+]?[\d.]+[\s,]+[-+]?[\d.]+[\s,]", name)
         hint = "; taken for a file's name: numbers say what they are by --from REP" if is_numbers else ""
         raise FileProblem(f"{called}: {(error.strerror or str(error)).lower()}{hint}") from None
-    except ValueError as error:
+    except (ValueError, TypeError) as error:
         raise FileProblem(f"{shown(name)} is no file name: {error}") from None
 
 

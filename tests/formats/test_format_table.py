@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 import yaml
 
-from frametool.errors import FormatError
+from frametool.errors import FileProblem, FormatError
 from frametool.formats.detect import UNSUPPORTED, by_sign, detect, of_folder
 from frametool.formats.load import load
 from frametool.formats.rows.pose_rows import ROWS
@@ -498,3 +498,9 @@ def test_xml_where_no_form_is_xml_names_no_forms(run: Callable[..., Any], data: 
     found = run("convert", "file.xml", files={"file.xml": data})
     assert (found.status, found.out) == (1, "")
     assert said in found.err
+
+
+@pytest.mark.parametrize("number", [1, True])
+def test_a_number_is_no_file(number: int) -> None:
+    with pytest.raises(FileProblem, match=f"'{number}' is no file name"):
+        load(number)  # type: ignore[arg-type]
