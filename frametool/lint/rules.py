@@ -155,6 +155,10 @@ class Statement(NamedTuple):
         return self.finding(error.rule, error.message + places)
 
 
+# formats whose quaternions are x, y, z, w; tables have them if a column says w
+W_LAST = ("calls", "launch", "tum", "g2o", "echo", "jsonl", "csv1", "csv2", "bag1", "bag2", "mcap")
+
+
 def _read(file: FrameFile, find: Find, *, normalize: bool) -> Iterator[Statement]:
     """Yield the edges of a file, and report errors; places in documents are searched once."""
 
@@ -162,6 +166,8 @@ def _read(file: FrameFile, find: Find, *, normalize: bool) -> Iterator[Statement
         find(error.finding)
 
     in_documents: list[tuple[Edge, bool]] = []
+    header = file.head().split(b"\n")[0].replace(b"yaw", b"")
+    is_w_last = file.format in W_LAST or (file.format in ("csv", "tsv", "semicolon") and b"w" in header)
     try:
         if not file.holds_samples:
             in_documents = _read_tree(file.source, find, normalize=normalize)
@@ -169,7 +175,7 @@ def _read(file: FrameFile, find: Find, *, normalize: bool) -> Iterator[Statement
             if edge.path:  # formats with matrices or angles, and with quaternions by name or always w first
                 in_documents.append((edge, False))
             elif edge.parent is not None:
-                column, w_first = 1 if edge.line else 0, looks_w_first(edge.components)
+                column, w_first = 1 if edge.line else 0, is_w_last and looks_w_first(edge.components)
                 yield Statement(edge.parent, *edge[1:4], file.name, edge.line, column, w_first)
     except Unanswered:
         raise
@@ -188,8 +194,7 @@ def _read(file: FrameFile, find: Find, *, normalize: bool) -> Iterator[Statement
 
 def looks_w_first(components: Rigid) -> bool:
     """Return True if a rotation may be the identity written with w first and read with w last."""
-    x, y, z, w = components[3:]
-    return bool(abs(x) == 1.0 and y == z == w == 0.0)
+    return bool(abs(components[3]) == 1.0 and not any(components[4:]))
 
 
 def _read_tree(source: Source, find: Find, *, normalize: bool) -> list[tuple[Edge, bool]]:

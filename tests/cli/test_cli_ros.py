@@ -323,6 +323,23 @@ def test_each_rule_finds_what_it_is_about_with_its_place(run: Run, rule: str) ->
     assert found[rule]["column"] >= 1
 
 
+UPSIDE_DOWN = {
+    "name,parent,x,y,z,roll_deg,pitch_deg,yaw_deg\na,b,0,0,1,180,0,0\n": 0,
+    "<mujoco><worldbody><body name='a' euler='180 0 0'/></worldbody></mujoco>": 0,
+    "<mujoco><worldbody><body name='a' quat='0 1 0 0'/></worldbody></mujoco>": 0,
+    "<sdf><model name='a'><link name='l'/><frame name='f'><pose degrees='1'>0 0 0 180 0 0</pose></frame></model></sdf>": 0,
+    "name,parent,x,y,z,qx,qy,qz,qw\na,b,0,0,1,1,0,0,0\n": 1,
+    "static_transform_publisher 0 0 1 1 0 0 0 b a\n": 1,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("text", "count"), UPSIDE_DOWN.items())
+def test_half_a_turn_about_x_is_suspicious_where_it_may_be_a_quaternion_with_w_last(
+    run: Run, text: str, count: int
+) -> None:
+    assert [each["rule"] for each in findings(run, text)] == ["w-first"] * count
+
+
 def test_a_sound_tree_and_a_sound_recording_have_no_findings(run: Run) -> None:
     assert findings(run, "frames: {map: {b: {xyz: [1, 0, 0], rpy_deg: [180, 0, 0]}}}") == []
     assert findings(run, moving(*STEADY)) == []
