@@ -2,8 +2,8 @@
 
 A document consists of dicts, lists, text and None: every scalar remains text as written, so that names are preserved
 (`on`, `007`, `12:30`) and numbers are parsed only by `frametool.text.numbers`.  Places are not stored while reading;
-they are searched when a message needs them.  To rewrite parts of a text there is a tree of its nodes, with the place
-of each.  Knows syntax only.
+they are searched when a message needs them.  For rewriting parts of a text, `parse_nodes` returns a tree of nodes with
+their places.  The module knows only syntax.
 """
 
 from __future__ import annotations
@@ -42,7 +42,8 @@ class Document(NamedTuple):
 def parse_documents(text: str, name: str, tags: Collection[str] = ()) -> list[Document]:
     """Read every document of a YAML or JSON text; empty ones are omitted.
 
-    name: of the text, for messages.  tags: YAML tags of mappings that are read, as in `parse_yaml`.
+    name: that of the text, for messages
+    tags: YAML tags of mappings that are read, as in `parse_yaml`
     Values are dict, list, str or None (an empty value, `~`, `null`); keys are text, each once.
     Raises FormatError with line and column.
     """
@@ -57,7 +58,7 @@ def parse_documents(text: str, name: str, tags: Collection[str] = ()) -> list[Do
 
 
 def check_text(source: Source) -> None:
-    """Refuse a text that is too long or has halves of surrogate pairs, which no encoding can write."""
+    """Raise FormatError for a text that is too long, or has half a surrogate pair, which no encoding can write."""
     if len(source.text) > sizes.MOST_CHARACTERS:
         problem = f"longer than {sizes.MOST_CHARACTERS} characters, the most in one file; split it"
         raise FormatError(problem, source=source.name)
@@ -72,7 +73,7 @@ def check_text(source: Source) -> None:
 
 
 def events_of(text: str) -> Iterator[Event]:
-    """Yield the values of a text that parse_documents has read, in order, with their places."""
+    """Yield the events of a text that `parse_documents` has read: its values in order, with their places."""
     if parse_json(Source("", text)) is not None:
         return json_events(text)
     from frametool.documents.yaml import yaml_events
@@ -83,15 +84,15 @@ def events_of(text: str) -> Iterator[Event]:
 def locate_many(text: str, paths: Sequence[Path], *, key: bool = False) -> list[tuple[int, int]]:
     """Return line and column, from 1, of the values at several paths, or of their keys, in one pass over a text.
 
-    text: one that `parse_documents` has read.
-    path: (document index, key or index, ...).  A missing value gets the place of the nearest enclosing one.
+    text: one that `parse_documents` has read
+    paths: (document index, key or index, ...); a missing value gets the place of the nearest enclosing one
     """
     text = text.removeprefix(_BYTE_ORDER_MARK)
     return places_of(text, _offsets(text, paths, key=key))
 
 
 def _offsets(text: str, paths: Sequence[Path], *, key: bool) -> list[int]:
-    """Iterate over the events of a text, and return the offset of the value, or of the key, at each path.
+    """Return the offset of the value, or of the key, at each path, in one pass over the events of a text.
 
     A path is (document, key or index, ...).  If the text does not have it, the offset is that of the nearest enclosing
     value.  In a list the key is the value; of equal keys the first is used.
@@ -140,7 +141,10 @@ def file_error(file: InputFile, what: str, line: int, path: Path, kind: type[For
 
 
 def explain_scalar(text: str) -> str:
-    """Return why a text is found instead of a mapping: no blank after a colon, an invisible character; or ""."""
+    """Return a hint at why a scalar is found instead of a mapping; "" if no reason is known.
+
+    Reasons are a missing blank after a colon, an invisible character, and `=` instead of a colon.
+    """
     if match := re.match(r"([\w./-]+):(?=[^\s:/])", text):
         return f"write a blank after '{match[1]}:'"
     if ":" in text and (strange := odd_characters(text)):
@@ -154,7 +158,9 @@ class Node(NamedTuple):
     """A value and its range in the text, from its first character to after its last.
 
     value: text of a scalar, a dict of (key node, value node) by key, or a list of nodes
-    flow: a map or list in brackets; quote: the quotes of a scalar, * for an alias; column of its first character
+    flow: False for a map or list without brackets
+    quote: that of a scalar, * for an alias
+    column: of the first character in YAML, from 0
     """
 
     start: int
@@ -245,7 +251,7 @@ class _NoJson(FormatError):
 
 def looks_like_json(text: str) -> bool:
     """Return True if the first non-blank character opens an array, or an object with a quoted key or no key."""
-    # without a pattern, whose compiling takes longer than a short text; an empty rest is in any text
+    # without a pattern: compiling it takes longer than reading a short text; `in` is True for an empty rest too
     return (begun := text.lstrip(BLANKS))[:1] == "[" or (begun[:1] == "{" and begun[1:].lstrip(BLANKS)[:1] in '"}')
 
 
@@ -262,7 +268,7 @@ def parse_json(source: Source) -> list[Any] | None:
 
 
 def strict_json(source: Source) -> list[Any]:
-    """Return the values of a text that must be JSON; otherwise raises FormatError with the place."""
+    """Return the values of a text that must be JSON; raises FormatError with the place."""
     from json import JSONDecoder
 
     text = source.text

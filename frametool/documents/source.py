@@ -1,9 +1,10 @@
-"""Sources of text and places in it: files, decoding, limits, places of keys and values, snippets.
+"""Texts and places in them: files, decoding, limits, lines and columns, snippets, streams in pieces.
 
-Knows no syntax.  Lines and columns are counted from 1; lines end as in YAML, so that places agree with the parser.
+The module knows no syntax.  Lines and columns are counted from 1; lines end as in YAML, so that places agree with the
+parser.
 
-A document may have a million frames, but no short text may allocate gigabytes.  Limited are: depth, which needs stack;
-lists and maps, which need thirty times the memory of their text; and the expansion of aliases.
+A document may have a million frames, but no short text may allocate gigabytes.  Therefore these are limited: depth,
+which needs stack; lists and maps, which need thirty times the memory of their text; the expansion of aliases.
 """
 
 from __future__ import annotations
@@ -35,11 +36,11 @@ if TYPE_CHECKING:
     Event: TypeAlias = tuple[int, str, int, int, str, int]
 
 MOST_KEPT, MOST_KEPT_BYTES = 32, 1 << 28  # values, and bytes of the files and texts they were read from
-SETTLED_NS = 50_000_000  # a file written just now may change again within one tick of its clock
+SETTLED_NS = 50_000_000  # a younger file is not cached: it may change again within one tick of the file system's clock
 
 
 def too_much(depth: int) -> str:
-    """Return which of the two limits is exceeded at a depth."""
+    """Return the message for a limit that is exceeded at a depth: the levels, or the number of lists and maps."""
     if depth >= sizes.DEEPEST:
         return f"nested deeper than {sizes.DEEPEST} levels"
     return f"more than {sizes.MOST_CONTAINERS} lists and maps in one file; split it"
@@ -75,7 +76,7 @@ TAG = "!"  # the key for the tag of a mapping of YAML: no plain key looks like i
 
 
 class Source(NamedTuple):
-    """A text with its name for messages; `first_line` and `column` are its start in the named file."""
+    """A text with its name for messages; `first_line` and `first_column` are its start in the named file."""
 
     name: str
     text: str
@@ -103,7 +104,7 @@ def states_of(path: str) -> list[State]:
 
 
 class Pasted(Source):
-    """A text converted from a pasted one, without places in it."""
+    """A text converted from a pasted one; errors about it have no place."""
 
 
 _noted: list[dict[str, list[State]]] = []  # each receives the state of every file when `opened` opens it
@@ -120,7 +121,7 @@ class ReadCache:
         self._values: dict[Hashable, tuple[Any, dict[str, list[State]], int]] = {}
 
     def read(self, key: Hashable, files: Iterable[str], size: int, read: Callable[[], Value]) -> Value:
-        """Return the result of `read` for files, and others that it opens; cached unless one of them has changed.
+        """Return the result of `read`, from the cache if neither its files nor others that it opened have changed.
 
         key: everything that determines what is read
         size: of texts that are read in addition to files
@@ -141,7 +142,7 @@ class ReadCache:
             if not plain or max((changed for _, changed, *_ in states), default=0) >= time.time_ns() - SETTLED_NS:
                 return value
             found = value, noted, size + sum(state[2] for state in states)
-        self._values[key] = found  # as the newest
+        self._values[key] = found  # as the newest entry
         while len(self._values) > MOST_KEPT or sum(size for *_, size in self._values.values()) > MOST_KEPT_BYTES:
             del self._values[next(iter(self._values))]
         return found[0]
@@ -171,17 +172,17 @@ def opened(path: str | PathLike[str]) -> BufferedReader:
         raise FileProblem(f"{shown(name)} is no file name: {error}") from None
 
 
-# values that end where the next one begins, or with the stream: a YAML key or entry on the first line, and XML
+# documents that end with the next one, or the stream: YAML that begins with a key or a list item, and XML
 _OVER_LINES = rb"""- |["']?[A-Za-z_][\w./-]*["']?[ \t]*:\s|\s*<"""
 
 
 def _data(begin: bytes) -> bytes:
-    """Return the complete lines of a text from the first line of data on."""
+    """Return the complete lines of a text, without leading comments, blank lines and `---`."""
     return re.sub(rb"\A(?:\xef\xbb\xbf)?(?:(?:#.*|---)?[ \t\r]*\n)*", b"", begin[: begin.rfind(b"\n") + 1])
 
 
 def has_line(begin: bytes) -> bool:
-    """Return True if a line of data has arrived, and it is not part of a document of many lines."""
+    """Return True if a complete line of data has arrived that does not begin a document of many lines."""
     data = _data(begin)
     return bool(data) and not re.match(_OVER_LINES, data)
 
@@ -205,7 +206,7 @@ def decode(data: bytes, name: str) -> str:
     except UnicodeDecodeError as error:
         start = error.start + (3 if encoding == "utf-8-sig" and data.startswith(b"\xef\xbb\xbf") else 0)
         before, what = data[:start].decode(encoding, "ignore"), not_text(data)
-        if not what:  # the text before the byte is shown, and after it as far as possible
+        if not what:  # the snippet shows the text before the byte, and after it with replacements
             after = data[start : start + 200].decode(encoding, "replace")
             label = "UTF-16" if encoding == "utf-16" else "UTF-8"
             problem = f"not {label}: byte 0x{data[start]:02x} does not belong there; convert the file (from Latin-1?)"
@@ -219,7 +220,7 @@ def decode(data: bytes, name: str) -> str:
 
 
 def not_text(data: bytes) -> str:
-    """Return the kind of data of bytes that are not UTF-8; "" if they may be text in another encoding."""
+    """Return a description of bytes that are no text; "" if they may be text in another encoding."""
     head = data[:LOOKED_AT]
     for magic, what in MAGIC.items():
         if head.startswith(magic):
@@ -237,7 +238,7 @@ def not_text(data: bytes) -> str:
 def places_of(text: str, offsets: Sequence[int]) -> list[tuple[int, int]]:
     """Return line and column of each offset, in one pass over the text.
 
-    All offsets after the last character, where parsers report missing characters, have the same place.
+    All offsets after the last non-blank character, where parsers report missing ones, have the place after it.
     """
     last = len(text.rstrip(" \t\r\n"))
     begins = [0, *(end.end() for end in re.finditer(_LINE_END, text[: max(offsets, default=0)]))]
@@ -319,7 +320,7 @@ class InputFile:
 
     @cached_property
     def text(self) -> str:
-        """Return the whole text; raises FormatError when it is not text, too."""
+        """Return the whole text; raises as `read` does, and FormatError if it is not text."""
         return decode(self.read(), self.name)
 
     @property
@@ -353,7 +354,7 @@ def paused_collector() -> Iterator[None]:
 
 
 def levels(value: Any) -> Iterator[list[Any]]:
-    """Yield the lists and maps in a list level by level, itself first; those of one may change before the next."""
+    """Yield the lists and maps in a list, level by level from itself on; a caller may change those of a level."""
     level = [value]
     while level:
         yield level
@@ -420,7 +421,7 @@ def documents(stream: BinaryIO, name: str) -> Iterator[Piece]:
 
 
 def _whole_documents(text: bytes) -> int:
-    """Return the number of bytes up to the last line that ends in `---`; negative: that many lines have none.
+    """Return the number of bytes up to the last line that ends in `---`; without one, minus those of complete lines.
 
     `ros2 topic echo` appends the three dashes to its note about a lost message.
     """
@@ -430,7 +431,7 @@ def _whole_documents(text: bytes) -> int:
 
 @contextmanager
 def counted_from(line: int) -> Iterator[None]:
-    """Make errors of a piece name the line in the whole file; `line` is the number of the piece's first line."""
+    """Shift the lines of errors in the block to those of the whole file; line: that of the text's first line."""
     try:
         yield
     except FormatError as error:

@@ -19,12 +19,12 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
     from typing import Any
 
-# begins with a letter, _ or /; then also digits . - and single blanks: unlike any indicator, number or date
+# a letter, _ or /, then also digits . - and single blanks: never an indicator, a number or a date
 _PLAIN = r"(?:[^\W\d]|/)[\w./-]*(?: [\w./-]+)*"
 _WORDS = frozenset(("y", "n", "yes", "no", "on", "off", "true", "false", "null", "nan", "inf", "infinity"))
 _ESCAPED = r'["\\]|[^ -~\xa1-\u1fff\u3001-\ud7ff\uf900-\ufdff\U00010000-\U0003ffff]'
 _ESCAPES = {'"': '\\"', "\\": "\\\\", "\n": "\\n", "\t": "\\t", "\r": "\\r"}
-_LONGEST_KEY = 200  # of 1024 bytes that a parser reads ahead for the colon
+_LONGEST_KEY = 200  # characters; a parser searches the colon in the next 1024 bytes
 _WIDEST_FLOW_MAP = 8
 _INFINITE = float("inf")
 
@@ -42,7 +42,7 @@ def dump_yaml(value: Any, number: Callable[[float], str] = repr) -> str:
 
 
 def flow(value: Any, number: Callable[[float], str] = repr) -> str:
-    """Write a value on one line, as inside brackets."""
+    """Write a value on one line, lists and maps in brackets."""
     if isinstance(value, dict):
         return "{" + ", ".join(f"{_key(key, value)}: {flow(each, number)}" for key, each in value.items()) + "}"
     if isinstance(value, (list, tuple)):
@@ -72,12 +72,12 @@ def quoted(text: str) -> str:
 
 
 def _key(key: str, siblings: dict[str, Any]) -> str:
-    """Write a key; y next to x is the coordinate, which no reader in use takes for a boolean."""
+    """Write a key; y after x remains without quotes, because no reader in use takes that for a boolean."""
     return key if key == "y" and "x" in siblings else quoted(key)
 
 
 def _escape(match: re.Match[str]) -> str:
-    """Escape a character that is not allowed in quotes."""
+    """Escape a character that is not allowed in quotes; raises ValueInvalid for half a surrogate pair."""
     code = ord(match[0])
     if 0xD800 <= code < 0xE000:
         raise ValueInvalid(f"{match.string!r} holds half a character and cannot be written")
@@ -85,7 +85,7 @@ def _escape(match: re.Match[str]) -> str:
 
 
 def _one_line(value: Any, number: Callable[[float], str]) -> str | None:
-    """Write a scalar, an empty or leaf list, or a small map of numbers; None for values that need a block."""
+    """Write a scalar, a list of scalars, or a small map of numbers; return None for values that need a block."""
     if isinstance(value, dict):
         if len(value) > _WIDEST_FLOW_MAP:
             return None
@@ -98,7 +98,7 @@ def _one_line(value: Any, number: Callable[[float], str]) -> str | None:
 
 
 def _block(value: Any, number: Callable[[float], str]) -> Iterator[str]:
-    """Yield the lines of a list or map, not indented."""
+    """Yield the lines of a list or map in blocks, without indentation."""
     if not isinstance(value, dict):
         for each in value:
             line = _one_line(each, number)
@@ -118,9 +118,9 @@ def _block(value: Any, number: Callable[[float], str]) -> Iterator[str]:
 
 
 def dump_json(value: Any, number: Callable[[float], str] = repr) -> str:
-    """Write plain values as JSON on one line; `number` formats the floats.
+    """Write plain values as JSON on one line.
 
-    `json.dumps` does not allow that.
+    number: formats a float, which `json.dumps` does not allow
     """
     if isinstance(value, (float, Verbatim)):
         return number(value) if isinstance(value, float) else str(value)

@@ -1,7 +1,7 @@
-"""XML as a tree of elements with their places; without entities.
+"""Read XML as a tree of elements with their places; entities are refused.
 
-It uses expat of the standard library and knows syntax only.  Names keep their prefix as written (`sensor:camera`), so
-that files with undeclared prefixes can be read too.
+The parser is expat of the standard library.  Names keep their prefix as written (`sensor:camera`), so that files with
+undeclared prefixes can be read too.
 """
 
 from __future__ import annotations
@@ -50,22 +50,22 @@ class Element:
     __slots__ = ("attributes", "children", "column", "file", "line", "offset", "tag", "text")
 
     def __init__(self, file: XmlFile, tag: str, attributes: dict[str, str], place: tuple[int, int, int]) -> None:
-        """Create it as it begins."""
+        """Create an element without text and children."""
         self.file, self.tag, self.attributes = file, tag, attributes
         self.line, self.column, self.offset = place
         self.children: list[Element] = []
         self.text = ""
 
     def all(self, *tags: str) -> Iterator[Element]:
-        """Yield the direct children of some kinds."""
+        """Yield the children with one of these tags."""
         return (child for child in self.children if child.tag in tags)
 
     def first(self, tag: str) -> Element | None:
-        """Return the first child of a kind, if there is one."""
+        """Return the first child with a tag; None without one."""
         return next(self.all(tag), None)
 
     def text_of(self, tag: str) -> str:
-        """Return the text of the first child of a kind; "" without such a child."""
+        """Return the text of the first child with a tag; "" without one."""
         found = self.first(tag)
         return "" if found is None else found.text
 
@@ -74,14 +74,17 @@ class Element:
         return self.attributes.get(name, "").strip()
 
     def required(self, attribute: str) -> str:
-        """Return an attribute that must be present and not empty."""
+        """Return an attribute; raises FormatError if it is missing or empty."""
         value = self.attributes.get(attribute)
         if not value:
             raise self.error(f"<{self.tag}> has no {attribute}", attribute if value is not None else "")
         return value
 
     def numbers(self, count: int, attribute: str = "", default: str | None = None) -> tuple[float, ...]:
-        """Read its text, or an attribute, as this many finite numbers between blanks; without it the default."""
+        """Read the text, or an attribute, as `count` finite numbers with blanks between them; raises FormatError.
+
+        default: text in place of a missing attribute
+        """
         text = self.attributes.get(attribute, default) if attribute else self.text
         if text is None:
             raise self.error(f"<{self.tag}> has no {attribute}")
@@ -96,11 +99,11 @@ class Element:
             raise self.error(f"{attribute or self.tag}: {error}", attribute) from None
 
     def error(self, message: str, attribute: str = "", *, rule: str = "") -> FormatError:
-        """Return the error for it, or for the value of one of its attributes."""
+        """Return the error for the element, or for the value of one of its attributes."""
         return self.file.at(*self.place(attribute), message, rule=rule)
 
     def place(self, attribute: str = "") -> tuple[int, int]:
-        """Return its line and column, or those of the value of one of its attributes."""
+        """Return line and column of the element, or of the value of one of its attributes."""
         line, column, data = self.line, self.column, self.file.data
         name = re.compile(rb"""\b%s\s*=\s*["']""" % re.escape(attribute.encode()))
         value = name.search(data, self.offset, self.offset + _BLOCK) if attribute else None
@@ -129,7 +132,7 @@ def _parse(parser: expat.XMLParserType, xml: XmlFile) -> None:
 def read_xml(file: InputFile, root: str = "", fmt: str = "") -> Element:
     """Return the root element.
 
-    root: its tag, if there is only one; fmt: the format's name, for a file with another root
+    root: its expected tag, "" for any; fmt: name of the format, for the message about another root
     Raises FormatError if it is not XML, and for declarations of entities.
     """
     xml = XmlFile(Source(file.name, ""), file.read())

@@ -1,8 +1,8 @@
-"""Convert YAML text to plain values and their places, by the parser's events; knows syntax only.
+"""Convert YAML text to plain values and their places, by the parser's events; knows only syntax.
 
 The library's constructors are not used: they convert names to numbers, dates and booleans, and allow a small text to
 grow without bound.  The loop here keeps every scalar as text and counts depth and aliases; the parser's errors become
-one line that tells a person what to do.
+one line with a hint.
 
     - {name: lidar, parent: base_link, xyz: [0.9, 0, 2.0], rpy_deg: [0, 0, 90]}
     - name: lidar
@@ -54,7 +54,7 @@ STANDIN = "\ue000"  # replaces a value that is read as JSON
 
 
 def split_run(text: str) -> tuple[str, list[Any]] | None:
-    """Replace the list of plain maps at the end of a text by STANDIN; return the rest, and the list as only value.
+    """Replace the list of plain maps at the end of a text by STANDIN; return the new text, and a list of this one list.
 
     Returns None if the text has no such end.
     """
@@ -74,7 +74,7 @@ def split_run(text: str) -> tuple[str, list[Any]] | None:
 
 
 def split_brackets(text: str) -> tuple[str, list[Any]] | None:
-    """Replace each plain value in brackets that ends a line by STANDIN; return the rest, and the values in order.
+    """Replace each plain value in brackets that ends a line by STANDIN; return the new text, and the values in order.
 
     Returns None without such values, or if the text is not plain.
     """
@@ -88,7 +88,7 @@ def split_brackets(text: str) -> tuple[str, list[Any]] | None:
 
 
 def _as_json(lines: str) -> list[Any] | None:
-    """Read one plain value in brackets per line as JSON; None if a key appears twice or there are too many."""
+    """Read one plain value in brackets per line as JSON; None for a duplicate key, or too many lists and maps."""
     from json import JSONDecoder
 
     if lines.count("{") + lines.count("[") > sizes.MOST_CONTAINERS:
@@ -195,7 +195,7 @@ def parse_yaml(source: Source, tags: Collection[str] = ()) -> list[Value]:
 
 
 def yaml_events(text: str) -> Iterator[Event]:
-    """Yield the values of a text in order, with their places, up to the first error."""
+    """Yield the events of a text, its values in order with their places, up to the first error."""
     get: Callable[[], Any] = _Loader(text).get_event
     kinds = _KINDS
     try:
@@ -215,7 +215,7 @@ def yaml_events(text: str) -> Iterator[Event]:
 
 
 class _Builder:
-    """Builds the values of one text; stores the state for rare events."""
+    """The values of one text while they are built, and the state that rare events need."""
 
     __slots__ = ("aliases", "anchors", "aside", "copies", "documents", "open", "source", "tags")
 
@@ -231,7 +231,7 @@ class _Builder:
         self.open: list[tuple[dict[str, Value] | list[Value], object]] = []
 
     def build(self) -> list[Value]:
-        """Run the loop; the parser's own errors become one line."""
+        """Return the values of all documents; raises FormatError, also for the parser's errors."""
         try:
             self._run(_Loader(self.source.text).get_event)
         except FormatError:
@@ -298,7 +298,7 @@ class _Builder:
                 key = None if kind is MappingStartEvent else item
 
     def _note(self, event: NodeEvent, value: Value) -> None:
-        """Store the tag of a mapping if it is accepted, refuse others; remember the value of an anchor."""
+        """Store the tag of a mapping if it is accepted, else raise FormatError; store the value of an anchor."""
         if event.tag is not None:
             tag = event.tag.replace("tag:yaml.org,2002:", "!!")
             if tag not in self.tags or type(value) is not dict:
@@ -308,7 +308,7 @@ class _Builder:
             self.anchors[event.anchor] = value
 
     def _refuse_key(self, event: ScalarEvent, current: Any) -> None:
-        """Raise for a key that is a duplicate, empty or a merge key; a quoted << is a name."""
+        """Raise FormatError for a key that is a duplicate, empty or a merge key; a quoted << is a name."""
         if event.value == "":
             raise self._error(event, "an empty key; write a name, or quotes around a blank one")
         if event.value in current:
@@ -319,7 +319,7 @@ class _Builder:
             raise self._error(event, "merge keys (<<) are not supported; write the entries out")
 
     def _repeat(self, event: AliasEvent, current: object, key: object) -> Value:
-        """Return a copy of an alias's value, within the budget."""
+        """Return a copy of the value of an alias; raises FormatError for an unknown one, and above the limits."""
         from frametool.documents.source import levels
 
         name = str(event.anchor)

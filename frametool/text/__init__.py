@@ -1,1 +1,1 @@
-"""Bulk conversion of bytes to lines, cells and floats, and back: knows no geometry and no format."""
+"""Bulk conversion of bytes to lines, cells and floats, and back, without geometry and formats."""

@@ -1,6 +1,6 @@
 """Read a stream in blocks of whole lines: a typed line at once, a full pipe in large pieces.
 
-Does not interpret lines and does not import numpy, so that commands with only a few lines start fast.
+Lines are not interpreted, and numpy is not imported, so that commands with only a few lines start fast.
 """
 
 from __future__ import annotations
@@ -89,7 +89,10 @@ def _read_piece(stream: ByteStream, size: int, ready: Callable[[int], bool]) -> 
 
 
 def readiness(stream: ByteStream, *, unknown: bool = False) -> Callable[[int], bool]:
-    """Return a function that returns True if more, or the end, arrives within this many milliseconds; or `unknown`."""
+    """Return a function that returns True if more bytes, or the end, arrive within this many milliseconds.
+
+    unknown: its result for a stream that cannot be polled
+    """
     import select
 
     try:
@@ -114,7 +117,7 @@ class Pieces(RawIOBase):
         return True
 
     def fileno(self) -> int:
-        """Return the file descriptor of the pieces."""
+        """Return the file descriptor of the source."""
         return int(self._source.fileno())
 
     def readinto(self, buffer: Any) -> int:
@@ -148,7 +151,7 @@ def arrived(stream: BufferedReader, is_enough: Callable[[bytes], bool], most: in
 
 
 def with_edits(text: AnyStr, edits: Iterable[tuple[int, int, AnyStr]]) -> AnyStr:
-    """Return text, or bytes, with others in the place of some stretches."""
+    """Return text or bytes with ranges replaced; edits: (start, end, replacement)."""
     pieces: list[AnyStr] = []
     end = 0
     for start, stop, new in sorted(edits):

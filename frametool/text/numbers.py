@@ -1,4 +1,4 @@
-"""Numbers, lengths and angles as people write them: knows text, knows no document.
+"""Read numbers, lengths and angles as people write them, each from its own text.
 
 A number is one of YAML 1.2 and JSON (`1e-3`, `-.5`, `5.`, `010` is ten); the additions of YAML 1.1 (base 60,
 octal, hexadecimal, underscores) are refused with the reason.  Units follow numbers and names of columns: `2cm`,
@@ -24,7 +24,7 @@ ANGLES = {"deg": True, "degree": True, "degrees": True, "°": True, "rad": False
 BRACKETS = r"(?<!\s)\s*+[\[(]\s*+((?:\s*+[^\[\]()\s]++)*+)\s*+[\])]$"
 
 
-# float() reads more than a decimal number (blanks, underscores, nan, other scripts' digits), but nothing else of these
+# float() also reads blanks, underscores, nan and other scripts' digits; of these characters only decimal numbers
 _DECIMAL_CHARACTERS = "0123456789.-+eE"
 _strip = str.strip  # raises TypeError for anything but text
 _INFINITE = float("inf")
@@ -34,7 +34,7 @@ _DECIMAL = r"(?:[0-9]++\.?+[0-9]*+|\.[0-9]++)(?:[eE][-+]?+[0-9]++)?+"
 _WITH_UNIT = rf"([-+]?{_DECIMAL}) ?(deg|rad|°)"
 _MULTIPLE_OF_PI = rf"([-+]?)({_DECIMAL})? ?\*? ?(?:pi|π) ?(?:/ ?({_DECIMAL}))?"
 _LENGTH = rf"([-+]?{_DECIMAL}) ?(m|cm|mm|um)"
-MOST_FRACTIONS = 1_000_000  # of a range
+MOST_FRACTIONS = 1_000_000  # of one range
 _ODD_MINUS = "\u2212\u2010\u2011\u2012\u2013\u2014\ufe63\uff0d"
 
 
@@ -100,7 +100,7 @@ def parse_length(text: str) -> float:
 
 
 def parse_share(text: str) -> float:
-    """Read `10%`, or a part of 1."""
+    """Read a share, `10%` or a number from 0 to 1; raises ValueInvalid."""
     found = re.fullmatch(r"(\d+\.?\d*|\.\d+)\s*(%?)", text.strip())
     share = float(found[1]) / (100 if found[2] else 1) if found else 2.0
     if share > 1.0:
@@ -109,7 +109,7 @@ def parse_share(text: str) -> float:
 
 
 def parse_lengths(text: str) -> tuple[float, ...]:
-    """Read lengths in metres, with commas between them."""
+    """Read positive lengths in metres, with commas between them; raises ValueInvalid."""
     try:
         lengths = tuple(float(each.strip().removesuffix("m")) for each in text.split(","))
     except ValueError:
@@ -145,9 +145,10 @@ def number_or_none(text: str) -> float:
 def read_number_or_angle(
     text: str, degrees: bool | None, *, metres: bool = False  # noqa: FBT001 - None: not an angle
 ) -> float:
-    """Read a cell: a plain number, or one with a unit, an angle in degrees or radians, a length in metres.
+    """Read a cell: a number, an angle or a length, plain or with a unit; raises ValueInvalid.
 
-    Raises ValueInvalid.
+    degrees: unit of a plain angle and of the result, False for radians; None: not an angle
+    metres: True for a length
     """
     if degrees is None:
         return parse_length(text) if metres else parse_number(text)

@@ -24,25 +24,25 @@ from frametool.text.write import TENS, ZEROS, halves, not_digits, product_error,
 _NUMBER = re.compile(rb"[ \t]*[+-]?(?:[0-9]++\.?[0-9]*+|\.[0-9]++)(?:[eE][+-]?[0-9]+)?[ \t]*")
 _MOST_WORDS = 3
 _EXACT = 1 << 53
-# results are accurate to 2**-100; rounding may be off by this share of itself and still be decided
+# results are accurate to 2**-100; one is certain if the remainder of rounding, times this, does not change it
 _DOUBT = 1.0 + 2.0**-30
 # with these exponents neither a product nor its error leaves the range of normal floats
 _GREATEST_EXPONENT = 240
 _MINUS, _PLUS, _SMALL_E = b"-+e"
 _LOWER_CASE = 0x20
-# the lowest 0 .. 8 bytes of a word
+# masks of the lowest 0 .. 8 bytes of a word
 LOWEST = np.array([(1 << 8 * count) - 1 for count in range(9)], np.uint64)
 
 
 class _Mantissa(NamedTuple):
-    """Integers `whole * 10**(8 * words - 8) + tail` of cells read as this many words after the point."""
+    """The digits of cells as integers `whole * 10**(8 * words - 8) + tail`; words: of eight digits after the point."""
 
     whole: Ints
     tail: Ints
     words: int
 
 
-LONGEST_MEANT = 32  # digits beyond this length do not matter
+LONGEST_MEANT = 32  # characters of a cell; those beyond do not matter
 
 
 def half_units(cells: Spans) -> Floats:
@@ -63,8 +63,8 @@ def parse_floats(cells: Spans) -> tuple[Floats, Ints]:
 
     Accepts plain decimal numbers, `[+-] digits [. digits] [e [+-] digits]`, with blanks or tabs around them;
     neither nan, inf, hexadecimals, underscores nor numbers beyond the range of floats.
-    Returns the values, in the cells' shape, and the indices of the bad ones in order, in the flattened
-    cells; a bad one's value is nan.
+    Returns the values, in the cells' shape, nan for invalid cells, and the indices of these in the flattened cells, in
+    order.
     """
     starts, ends = cells.starts.ravel(), cells.ends.ravel()
     # if the first cell begins with a blank, nearly all do
@@ -73,7 +73,7 @@ def parse_floats(cells: Spans) -> tuple[Floats, Ints]:
     values, sure = _parse_plain(cells.data, starts, ends)
     rest = np.flatnonzero(~sure)
     if rest.size:
-        # overflows are undecided, and read singly
+        # overflows are uncertain, and read one by one
         with np.errstate(over="ignore", invalid="ignore"):
             values[rest], sure = _parse_decorated(cells.data, starts[rest], ends[rest])
         rest = rest[~sure]
@@ -85,7 +85,7 @@ def parse_floats(cells: Spans) -> tuple[Floats, Ints]:
 
 
 def _parse_plain(data: Bytes, starts: Ints, ends: Ints) -> tuple[Floats, Flags]:
-    """Read cells without blanks and exponents; return the values and which of them are decided."""
+    """Read cells without blanks and exponents; return the values and the mask of certain ones."""
     begins, negative = _after_sign(data, starts)
     mantissa, sure = _read_mantissa(data, begins, ends)
     if mantissa.words == 1:

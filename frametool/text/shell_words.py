@@ -54,7 +54,7 @@ def has_words(line: str) -> bool:
 
 
 def goes_on(line: str) -> bool:
-    """Return True for a line that ends in a backslash, which is neither escaped nor in a comment."""
+    """Return True for a line that continues on the next: it ends in a backslash, not escaped and not in a comment."""
     backslashes = len(line) - len(line.rstrip("\\"))
     return backslashes % 2 == 1 and any(token.end() == len(line) for token, _ in _tokens(line))
 
@@ -66,7 +66,7 @@ def pipeline(line: str) -> list[str]:
 
 
 def split(line: str, value_of: Callable[[str], str]) -> list[str]:
-    """Return the words of a line with variables replaced; raise Misused for what cannot be parsed."""
+    """Return the words of a line with variables replaced; raises Misused for an open quote, and features of a shell."""
     words: list[str] = []
     for token, begins in _tokens(line):
         kind = token.lastgroup or ""
@@ -79,7 +79,7 @@ def split(line: str, value_of: Callable[[str], str]) -> list[str]:
 
 
 def _text(kind: str, text: str, value_of: Callable[[str], str], *, begins: bool = False) -> str:
-    """Return the text of a token."""
+    """Return the text of a token; kind: its group in the pattern; begins: True for the first of a word."""
     if kind == "double":
         return _IN_QUOTES.sub(lambda each: _text(each.lastgroup or "", each[each.lastgroup or ""], value_of), text)
     if kind == "dollar":

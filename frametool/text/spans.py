@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 # around every span this many bytes of `data` may be read, whatever they are: copies use whole windows
 MARGIN = 64
-# windows of one batch fit into the second-level cache, unless a row has so many that their number costs more
+# windows of one batch fit into the second-level cache, but a batch has at least this many rows, because each costs
 _BATCH_BYTES, _LEAST_ROWS = 1 << 17, 1 << 8
 _NOTHING_HIDDEN: Flags = np.empty(0, np.bool_)
 _CLOSING_QUOTE = re.compile(rb'(?:[^"]++|"")*+"')
@@ -253,7 +253,7 @@ def _closed(block: bytes) -> tuple[Bytes, int]:
 
 
 def _inside_quotes(data: Bytes, end: int, delimiter: bytes) -> Flags | None:
-    """Return which bytes are inside quotes; None if some quote neither opens, closes nor doubles another."""
+    """Return the mask of bytes inside quotes; None if a quote neither opens, closes nor doubles another."""
     quotes = np.flatnonzero(data[:end] == _QUOTE)
     opening, closing = quotes[::2], quotes[1::2]
     before, after = data[opening - 1], data[closing + 1]

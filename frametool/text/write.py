@@ -164,7 +164,7 @@ _SMALLEST, _LARGEST = 1e-270, 1e270
 _MANTISSA = np.int64((1 << 52) - 1)
 # the error of the scaled value is below 2**-45; the margin costs one row in 10**11
 _DOUBTFUL = 2.0**-40
-# numbers of up to fifteen digits are the only ones this short that read as their float
+# a float has at most one decimal of up to fifteen digits that reads back as it
 _SHORT_DECIMALS = 6
 _GREATEST_SHORT = 1e15
 _PROBE = 32
@@ -323,7 +323,7 @@ def replaced(spans: Spans, places: Ints, texts: Sequence[str]) -> Spans:
     return Spans(np.concatenate([spans.data, added]), spans.starts, spans.ends)
 
 
-# repr writes an exponent below the first and from the second on; Python writes numbers between GREATEST_WHOLE and it
+# repr writes an exponent below the first and from the second on; numbers from GREATEST_WHOLE to it are left to repr
 _LEAST_PLAIN = 1e-4
 _LEAST_POWER = 1e16
 _MOST_DIGITS = 17
