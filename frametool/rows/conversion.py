@@ -38,7 +38,7 @@ from frametool.grammar.edges import Answers, Diagnostics, EdgeColumns, Options, 
 from frametool.grammar.readers import EARTH_FRAMES
 from frametool.grammar.result import Style
 from frametool.rows.batch import NO_ROWS, NO_STAMP, RowPoses, block_of, kept
-from frametool.rows.faults import NULL, SKIP, BadRow, Fault, Outcome, written_by
+from frametool.rows.faults import DEGREES, NULL, SKIP, BadRow, Fault, Outcome, written_by
 from frametool.rows.request import NO_STAMPS, SOME, Request, RowOptions
 from frametool.rows.shapes import POINT, POSE, Shape
 from frametool.rows.sinks.as_rows import LEARNED, PoseWriter, RowsWriter, SingleWriter, TextWriter
@@ -205,8 +205,7 @@ class FormatConverter:
             move_along(columns, self.request)
         else:
             options = Options(self.tally, Topics(), normalize=self.request.rows.normalize, answers=self.answers)
-            is_same = self.fmt == self.style.format
-            columns = ListedPoses(file, options, self.request, numbered=is_same)  # type: ignore[abstract]
+            columns = ListedPoses(file, options, self.request, numbered=self.fmt == self.style.format)  # type: ignore[abstract]
         return ColumnRows(columns, self.request, self.source)
 
     def _without_gaps(self, rows: TableRows | ColumnRows) -> Iterator[Step]:
@@ -293,6 +292,8 @@ def read(file: InputFile, options: Options) -> Iterator[EdgeColumns]:
             if len(named) < 2:
                 column = rows.table.name(rows.layout.times[0])
                 faults += [Fault(line + at, column, "no stamp") for at in parts.pop(0).lines.tolist()]
+        for note in (each for each in outcome.notes if each.about == DEGREES):
+            options.tally.note(note.sentence.replace("give --deg, or ", ""), line + note.line, DEGREES)
         for fault in [*faults, *nameless.values()]:
             options.report(BadRow(fault, str(fault.reason), source=file.name))
         for part in parts:
@@ -301,10 +302,8 @@ def read(file: InputFile, options: Options) -> Iterator[EdgeColumns]:
         line, count = line + outcome.lines, count + len(block.numbers)
     if len(named) < 2:
         describe(options, fmt, count)
-    if fmt.rotation == "matrix":
-        options.tally.projected = converter.rows.off
-    else:
-        options.tally.rough += [1] * converter.rows.mended
+    options.tally.projected = converter.rows.off * (fmt.rotation == "matrix")
+    options.tally.rough += [1] * (converter.rows.mended * (fmt.rotation != "matrix"))
 
 
 def _edges(block: RowPoses, line: int, fmt: Rows, options: Options) -> EdgeColumns:
