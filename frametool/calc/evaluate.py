@@ -8,7 +8,7 @@ vector or a twist in the notation of results.
     {xyz: [1, 2, 3], rpy_deg: [0, 0, 90]}    {name: tool, parent: wrist, xyz: [0, 0, 0.1]}
     {frame: map, point: [1, 2, 3]}           {twist: [1, 0, 0, 0, 0, 0.5]}
 
-Also `frametool.calc(..)`: expressions in Python, whose values carry their frames.
+`frametool.calc(..)` evaluates an expression for Python; the value has frames.
 """
 
 from __future__ import annotations
@@ -383,7 +383,7 @@ class Framed:
 
     @property
     def source(self) -> str | None:
-        """The frame whose pose it is."""
+        """The frame of which this is the pose."""
         return self._term.type.source
 
     @property

@@ -1,6 +1,6 @@
 """The parser of expressions: tokens with their positions, and a grammar by precedence climbing.
 
-Knows neither frames nor numbers.  A look-up such as `map<-base_link` is one token: a frame's name may contain `/`, `:`,
+The parser computes nothing.  A look-up such as `map<-base_link` is one token: a frame's name may contain `/`, `:`,
 `.` and `-`.
 
     sum     = product {("+" | "-") product}        product = factor {("*" | "/") factor}

@@ -3,7 +3,7 @@
 Frames are checked for each pair of names in the rows, numbers for all rows at once, because they do not depend on the
 names of frames.
 
-Also the poses of a table as one list, read like the rows of a stream.
+The module also reads the poses of a table as one list, like the rows of a stream.
 """
 
 from __future__ import annotations

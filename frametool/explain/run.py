@@ -1,8 +1,8 @@
 """Evaluate the sheets in `sheets.txt`, the text of derivations: a `Sheet` fills in the numbers of a run.
 
-Also the steps that several sheets share, of angles and lengths.  A formula is one string in Python's arithmetic; its
-syntax tree gives the value, and in `render` the text and the LaTeX, so that the three cannot disagree.  The tree is
-interpreted; nothing is executed.
+It also has the steps that several sheets share, of angles and lengths.  A formula is one string in Python's
+arithmetic; its syntax tree gives the value, and in `render` the text and the LaTeX, so that the three cannot disagree.
+The tree is interpreted; nothing is executed.
 """
 
 from __future__ import annotations

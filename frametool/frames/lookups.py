@@ -1,7 +1,7 @@
 """Queries of frames: their names, how they are connected, the pose of one in another, and at which times.
 
 `Frames` has the queries of static trees and recordings alike; `FrameTree` holds static frames.  A replay repeats a
-lookup while time advances.  Knows no files and no text.
+lookup while time advances.
 """
 
 from __future__ import annotations
@@ -189,10 +189,10 @@ class Frames:
     def lookup_across(
         self, target: str, target_at_ns: int | None, source: str, source_at_ns: int | None, fixed: str,
     ) -> Transform:  # fmt: skip
-        """Return the pose of source at one time in target at another time.
+        """Return the pose of source at one time in target at another time; raises as `lookup`.
 
-        fixed: a frame that is assumed static in between, such as the map.  A time of None is the latest of that half.
-        Raises as `lookup`.
+        fixed: a frame that is assumed static in between, such as the map
+        target_at_ns, source_at_ns: None for the latest time of the transform between `fixed` and this frame
         """
         self.require(target, source, fixed)
         fixed_from_source = self.lookup_components(fixed, source, source_at_ns)
@@ -403,8 +403,8 @@ class FrameTree(Frames):
 
         covariance: of this pose, as `covariance` returns it, or 6 rows of 6; None is exact.
         Adding an edge again with the same numbers changes nothing.
-        Raises BadTopology for a second parent, other numbers for the same edge, a cycle, or a frame in itself;
-        ValueInvalid for what is not one Transform, and for numbers that are not a covariance.
+        Raises BadTopology for a second parent, other numbers for the same edge, a cycle, or a frame as its own parent;
+        ValueInvalid for anything but a single Transform, and for numbers that are not a covariance.
         """
         parent, child = self.resolve_name(parent), self.resolve_name(child)
         known, (components, found) = self._tracks.get(child), taken(transform, covariance)
@@ -449,7 +449,7 @@ class FrameTree(Frames):
         """
         if self.groups.of(target) != self.groups.of(source):
             self.between(target, source, None)  # raises
-        ways = ({target: IDENTITY}, {source: IDENTITY})  # frames above -> the pose in them of what is below
+        ways = ({target: IDENTITY}, {source: IDENTITY})  # ancestor -> pose of target, or of source, in it
         tops = [target, source]
         at = 0
         while (top := tops[at]) not in ways[1 - at]:

@@ -137,7 +137,7 @@ def check_same(child: str, known: tuple[str, Rigid], found: tuple[str, Rigid]) -
 
 
 def own_parent(child: str) -> BadTopology:
-    """Return the error for a frame in itself."""
+    """Return the error for a frame that is its own parent."""
     return BadTopology(f"frame {shown(child)} is its own parent", rule="self")
 
 

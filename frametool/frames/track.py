@@ -1,6 +1,6 @@
 """The pose of one frame over time: a static pose in its parent, or samples in its parents, oldest first.
 
-Knows stamps in integer nanoseconds and components; knows no other frames.
+A track has components and stamps in integer nanoseconds, and does not depend on other frames.
 """
 
 from __future__ import annotations

@@ -171,7 +171,7 @@ def _fill(out: Floats, query: Query, times: Stamps) -> None:
     inside = out[:, begin:end]
     for start, stop in arrays.blocks(max(end - begin, 0)):
         block = times[begin + start : begin + stop]
-        with np.errstate(all="ignore"):  # what overflows is not finite, and refused where it is used
+        with np.errstate(all="ignore"):  # results that overflow are not finite, and refused by their users
             found = query.compose(methodcaller("at_many", block))
         assert found is not None  # noqa: S101 - all times are covered
         for row, column in zip(inside, (*found[:3], *quaternion.unit(*found[3:], arrays)), strict=True):

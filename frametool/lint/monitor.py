@@ -1,6 +1,6 @@
 """Analyse the samples of edges in order of arrival: rate, first and last stamp, gaps, jumps and backward stamps.
 
-Also returns the report of `monitor`, plain mappings with units in their keys: one per edge, and one for a chain.
+The report of `monitor` consists of plain mappings with units in their keys: one per edge, and one for a chain.
 """
 
 from __future__ import annotations

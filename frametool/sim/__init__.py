@@ -1,4 +1,4 @@
 """The turtles: turtlesim's world, its leaders and followers, in simulated time.
 
-Knows no display and no options. Text is read by `scene` and written by `simulate` only.
+Text is read only by `scene` and written only by `simulate`; the package does not depend on a display or on options.
 """

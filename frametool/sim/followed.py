@@ -1,6 +1,6 @@
 """`frametool.explain`: the derivation of an operation, as its command prints it with --explain.
 
-Also the derivation of one control step of the followers of a run.
+The module also derives one control step of the followers of a run.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Turtlesim's world and its turtles: motion, constants and rounding of the node, its services; and what drives them.
+"""Turtlesim's world and its turtles: motion, constants and rounding of the node, its services; leaders and followers.
 
 Lengths in metres, angles in radians, x to the right, y up; internally y points down from the top as in turtlesim.
 Source: turtlesim's turtle.cpp, for ROS 1 and ROS 2.
@@ -336,7 +336,7 @@ def complete(service: str, arguments: dict[str, float | str]) -> dict[str, float
     return {name: value for name, value in values.items() if value is not None}
 
 
-# --- what drives turtles ---
+# --- leaders and followers ---
 
 # law -> rate in Hz, linear gain in 1/s, angular gain in 1/s: turtle_tf2_listener of each ROS
 LAWS = {"ros1": (10.0, 0.5, 4.0), "ros2": (1.0, 0.5, 1.0)}

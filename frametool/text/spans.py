@@ -2,7 +2,7 @@
 
 A span is a start and an end in `data`; columns of text are arrays of spans, so that unchanged text is never decoded.
 Two families of cells: between delimiters (CSV, TSV; quoted as in RFC 4180) and between blanks (TUM and others).
-Does not interpret text.
+The text is not interpreted.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Choose the frames of a tree to draw, in a fixed frame and at a time, with poses and trails in metres.
 
-Common to the page, SVG, PNG, GLB and the terminal.  Also the orthographic projection to pixels, and the placement of
+The page, SVG, PNG, GLB and the terminal use this module.  It also projects to pixels orthographically, and places
 names without overlaps, in a grid of cells.
 """
 

@@ -1,7 +1,7 @@
 """Draw static pictures of SVG elements, in pixels with y down, and write them as SVG, HTML or PNG.
 
-Also charts, the HTML shell of all pages, and overlays on camera images.  A colour is `#rrggbb` or a name in PALETTE,
-with a light and a dark value.  Only PNG needs a library, matplotlib.
+The module also has charts, the HTML shell of all pages, and overlays on camera images.  A colour is `#rrggbb` or a
+name in PALETTE, with a light and a dark value.  Only PNG needs a library, matplotlib.
 """
 
 from __future__ import annotations

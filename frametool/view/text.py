@@ -1,6 +1,6 @@
 """Write text for people: poses and points, aligned on the decimal points, and blocks like those of tf2_echo.
 
-Also the terminal by rich: its colours, and progress bars on stderr for jobs longer than two seconds.
+Colours on a terminal, and progress bars on stderr for jobs longer than two seconds, are written by rich.
 """
 
 from __future__ import annotations

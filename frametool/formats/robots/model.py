@@ -8,7 +8,7 @@ joint with several degrees of freedom.  `Robot.fk` and the edges of a tree use t
     robot = frametool.load_robot("arm.urdf")
     base_from_tip = robot.fk("base", "tip", {"shoulder": 0.3, "elbow": numpy.linspace(0.0, 1.0, 1000)})
 
-Knows neither files of values nor times: those are in `frametool.formats.robots.joints`.
+Joint values from files, and over time, are in `frametool.formats.robots.joints`.
 """
 
 from __future__ import annotations
