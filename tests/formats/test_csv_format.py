@@ -43,7 +43,7 @@ def test_a_row_of_a_tree_without_the_name_of_a_frame_is_an_error(run: Run, row: 
 
 
 def test_angles_of_a_tree_that_look_like_degrees_are_a_warning(run: Run) -> None:
-    files = {"t.csv": "name,parent,x,y,z,yaw\na,b,1,2,3,0\nlidar,base,1,2,3,90\n"}
+    files = {"t.csv": "name,parent,x,y,z,yaw\na,base,1,2,3,0\nlidar,base,1,2,3,90\n"}
     said = "rpy 90 is more than a full turn in radians; degrees? name the columns _deg"
     assert run("lookup", "t.csv", "base", "lidar", files=files).err == f"frametool: warning: t.csv:3: {said}\n"
     assert run("check", "t.csv").out == f"t.csv:3:1: warning: {said} [degrees]\n"
