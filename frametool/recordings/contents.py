@@ -148,7 +148,7 @@ def _record_of(message: Any) -> tuple[tuple[str, ...], np.dtype[Any]]:
     return tuple(columns), np.dtype({"names": places, "formats": formats, "offsets": offsets, "itemsize": step})
 
 
-FIX = "sensor_msgs/msg/NavSatFix"
+FIX, POINT = "sensor_msgs/msg/NavSatFix", "geometry_msgs/msg/PointStamped"
 STAMPED = ("Point", "Pose", "PoseWithCovariance", "Vector3", "Quaternion", "Twist", "TwistWithCovariance", "Wrench",
            "Accel", "AccelWithCovariance", "Transform")  # fmt: skip
 RECORDS = frozenset((
@@ -175,11 +175,12 @@ def open_records(path: str, chosen: Collection[str], tally: Diagnostics) -> Buff
 def open_trajectory(path: str, chosen: Collection[str], tally: Diagnostics) -> tuple[BufferedReader, str] | None:
     """Open the poses of the chosen topic, or of the only topic with poses, as JSON lines; return the topic too.
 
+    Without poses, positions are taken alike.
     None unless there is exactly one such topic, and if the (chosen) topics have transforms too.
     """
     with ExitStack() as opened:
         reader = opened.enter_context(opened_recording(path, tally))
-        found = reader.on_topics(POSES, chosen)
+        found = reader.on_topics(POSES, chosen) or reader.on_topics({FIX, POINT}, chosen)
         if len({each.topic for each in found}) != 1 or reader.on_topics(TYPES, chosen):
             return None
         return BufferedReader(Pieces(_pieces(reader, found), opened.pop_all())), found[0].topic

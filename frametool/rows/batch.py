@@ -493,7 +493,8 @@ def values_of(block: RowPoses, place: Place | None = None) -> list[Any]:
         said = with_entries(dict(zip(extras, [None] * len(extras) if has_none else numbers[size:], strict=True)))
         if stamps is not None:
             said["stamp_ns"] = None if stamps[at] == NO_STAMP else stamps[at]
-        said |= {name: cells[at] for name, cells in others.items()}
+        # at a position on the Earth the columns of a covariance are read, but no list of nine
+        said |= (dict if place else with_entries)({name: cells[at] for name, cells in others.items()})
         named: dict[str, Any] = {"name": names[at]} if names[at] else {}
         if kind == POSE:
             pose = Pose.of(own or NOWHERE, names[at], parents[at])._replace(read=block.spot(at))

@@ -73,7 +73,7 @@ class Gathered:
         line = 1
         for rows, outcome in steps:
             if len(rows.numbers):
-                numbers = rows.numbers[:, :7]
+                numbers = rows.numbers[:, : 7 if rows.kind == POSE else POSITION]  # a covariance is behind them
                 numbers = np.pad(numbers, ((0, 0), (0, 7 - numbers.shape[1])), constant_values=np.nan)
                 numbers[:, : 0 if rows.placed else POSITION] = np.nan
                 extras = {key: rows.extras[key] for key in self.keys if key in rows.extras}

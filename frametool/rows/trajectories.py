@@ -55,6 +55,7 @@ WORDS = {  # what the settings of `compare` may be as text
 }  # fmt: skip
 RECORDINGS = tuple(name for name, row in FORMATS.items() if row.reader == BAG)
 TREE = rb"""(?m)^[^\S\n]*+(?:---\s*+)?+(?:\{\s*+)?+["']?(?:frames|transforms|angles)["']?\s*:"""  # of a tree
+POSITIONS = rb"""(?m)(?:^|[{,.]\s*)["']?(?:point|latitude)["']?\s*[:,.]"""  # of a message that is no pose
 
 
 def load_trajectory(
@@ -104,7 +105,8 @@ def read_trajectory(
         file = InputFile(name)
     with nullcontext() if file is None else closing(file):
         if file is not None:
-            fmt = fmt or detect(file.head(), "rows", "arrays", "tree", "records", name=file.path)
+            reads = ("rows", "arrays", "records", *["tree"] * (re.search(POSITIONS, file.head()) is None))
+            fmt = fmt or detect(file.head(), *reads, name=file.path)
         if file is None or holds_tree(file, fmt):
             return _of_tree(name, fmt, topics, answers, inside, file, normalize=normalize)
         return _of_samples(file, fmt, answers, policy(file.name), body, normalize=normalize)
@@ -113,9 +115,7 @@ def read_trajectory(
 def holds_tree(file: InputFile, fmt: str) -> bool:
     """Return True for a file of edges rather than of records, of rows, or of columns of numbers."""
     reads = FORMATS[fmt].reads
-    if "records" in reads:
-        return re.search(TREE, file.head()) is not None
-    return {"rows", "arrays"}.isdisjoint(reads)
+    return re.search(TREE, file.head()) is not None if "records" in reads else {"rows", "arrays"}.isdisjoint(reads)
 
 
 def split_name(text: str) -> tuple[str, list[str]]:
@@ -127,8 +127,7 @@ def split_name(text: str) -> tuple[str, list[str]]:
     end = next((end for end in ends if text[:end] == "-" or os.path.exists(text[:end])), None)
     if end is None:
         raise FileProblem(f"{text}: no such file or directory")
-    rest = re.findall(r':(?:"([^"]*)"|\'([^\']*)\'|([^:]*))', text[end:])
-    names = ["".join(each) for each in rest]
+    names = ["".join(each) for each in re.findall(r':(?:"([^"]*)"|\'([^\']*)\'|([^:]*))', text[end:])]
     if len(names) > 2 or not all(names):
         raise ValueInvalid(f"{shown(text)}: behind the file stand a topic, or TARGET:SOURCE; quote names with a colon")
     return text[:end], names

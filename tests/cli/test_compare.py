@@ -16,7 +16,7 @@ import frametool
 from frametool.view.comparison_report import write_report
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
     from conftest import Outcome
 
@@ -470,3 +470,47 @@ def test_poses_of_several_bodies_are_no_trajectory_in_any_form(run: Run, form: s
     done = run("resample", "two", "--rate", "1", files=files)
     told = "two: poses of several frames (world:a, world:b ..); name one: two:TARGET:SOURCE"
     assert (done.status, done.out, done.err) == (1, "", f"frametool: {told}\n")
+
+
+def at_seconds(positions: Sequence[Sequence[float]], line: Callable[[int, Sequence[float]], str]) -> str:
+    return "".join(line(second, each) + "\n" for second, each in enumerate(positions, 1))
+
+
+def header_at(second: int) -> dict[str, Any]:
+    return {"stamp": {"sec": second, "nanosec": 0}, "frame_id": "gps"}
+
+
+@pytest.mark.parametrize("beside", ["sigma_x", ",".join(f"c{i}{j}" for i in (1, 2, 3) for j in (1, 2, 3))])
+@pytest.mark.parametrize("form", ["csv", "parquet", "json"])
+def test_positions_with_a_covariance_have_no_rotation(run: Run, beside: str, form: str) -> None:
+    """Its numbers are not those of a quaternion."""
+    cells = "0.5" if beside == "sigma_x" else "1,0,0,0,1,0,0,0,1"
+    table = f"t,x,y,z,{beside}\n" + at_seconds([(0, 0, 0), (1, 0, 0), (1, 1, 0), (1, 1, 1)], lambda t, p: f"{t},{p[0]},{p[1]},{p[2]},{cells}")
+    if form != "csv":
+        assert run("convert", "-o", f"walk.{form}", stdin=table).status == 0
+    files = {"walk.csv": table} if form == "csv" else {}
+    assert run("resample", f"walk.{form}", "--rate", "1", "-f", "csv", files=files).out.splitlines()[:2] == ["x,y,z,stamp_ns", "0.0,0.0,0.0,1000000000"]
+    found = json.loads(run("compare", f"walk.{form}", f"walk.{form}", "-f", "json").out)
+    assert (found["ate"]["m"]["max"] < 1e-12, found["ate"]["deg"]) == (True, None)
+
+
+def test_messages_of_positions_are_trajectories(run: Run) -> None:
+    """NavSatFix and PointStamped, echoed as YAML, as JSON lines, as CSV, or recorded."""
+    walk = [(0.0, 0.0, 0.0), (10.0, 0.0, 1.0), (10.0, 5.0, 2.0), (15.0, 15.0, 0.0)]
+    points = at_seconds(walk, lambda t, p: json.dumps({"header": header_at(t), "point": dict(zip("xyz", p, strict=True))}))
+    enu = "t,east,north,up\n" + at_seconds(walk, lambda t, p: f"{t},{p[0]},{p[1]},{p[2]}")
+    lla = [[float(each) for each in row.split(",")[1:]] for row in run("convert", "--to", "lla", "--origin", "48,11,500", stdin=enu).out.splitlines()[1:]]
+    fixes = at_seconds(lla, lambda t, p: json.dumps({"header": header_at(t), "status": {"status": 0, "service": 1}, "latitude": p[0], "longitude": p[1], "altitude": p[2], "position_covariance": [1, 0, 0, 0, 1, 0, 0, 0, 1], "position_covariance_type": 2}))
+    titles = ",".join(f"field.position_covariance{at}" for at in range(9))
+    printed = f"%time,field.header.stamp,field.latitude,field.longitude,field.altitude,{titles}\n" + at_seconds(lla, lambda t, p: f"{t}000000000,{t}000000000,{p[0]},{p[1]},{p[2]},1,0,0,0,1,0,0,0,1")
+    files = {"walk.csv": "t,x,y,z\n" + at_seconds(walk, lambda t, p: f"{t},{p[0]},{p[1]},{p[2]}"), "points.jsonl": points, "fixes.jsonl": fixes, "fixes.csv": printed}
+    for name in ("points", "fixes"):
+        files[f"{name}.yaml"] = "".join(f"{yaml.safe_dump(json.loads(line), sort_keys=False)}---\n" for line in files[f"{name}.jsonl"].splitlines())
+        assert run("convert", "-i", f"{name}.jsonl", "-o", f"{name}.mcap", files=files).status == 0
+    for name in (*list(files)[1:], "points.mcap", "fixes.mcap", "fixes.mcap:/fix"):
+        done = run("compare", "walk.csv", name, "--max-gap", "5s", "-f", "json", files=files)
+        assert done.status == 0, done.err
+        found = json.loads(done.out)
+        assert found["poses"]["paired"] == 4
+        assert found["ate"]["m"]["max"] < 1e-8
+        assert found["ate"]["deg"] is None

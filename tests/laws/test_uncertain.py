@@ -352,3 +352,15 @@ def test_a_table_of_calc_has_no_covariance_of_what_was_moved(run: Run, form: str
         added = run("calc", "-e", "a=norm(row)", stdin=table)
         assert added.err == ""
         assert names.partition(",")[0] in added.out
+
+
+@pytest.mark.parametrize("form", ["json", "yaml"])
+def test_the_columns_of_a_points_covariance_become_one_list(run: Run, form: str) -> None:
+    """As those of a pose do; what was written reads back."""
+    table = f"x,y,z,{','.join(f'c{i}{j}' for i in (1, 2, 3) for j in (1, 2, 3))},id\n1,2,3,4,0.5,0,0.5,1,0,0,0,9,a\n"
+    text = run("convert", "-f", form, stdin=table).out
+    (found,) = flat(values(text, form))
+    assert found == {"point": [1, 2, 3], "id": "a", "covariance": [4, 0.5, 0, 0.5, 1, 0, 0, 0, 9]}
+    assert run("convert", "-f", "json", stdin=text).err == ""
+    move = ("apply", "--transform", EXACT, "-f", "json")
+    assert json.loads(run(*move, stdin=text).out)["covariance"] == json.loads(run(*move, stdin=table).out)["covariance"]
