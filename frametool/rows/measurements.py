@@ -74,8 +74,7 @@ def read_measurements(
     found: list[Measurement] = []
     try:
         for file in files:
-            first: dict[tuple[str, str], MeasuredRow] = {}
-            rows: list[MeasuredRow] = []
+            first, rows = dict[tuple[str, str], MeasuredRow](), list[MeasuredRow]()
             is_rows = file.format == "jsonl" and not re.search(WRAPPED, file.head())
             read = _of_table if file.format in ("csv", "tsv", "semicolon") else _of_edges
             read = _of_documents if is_rows or not file.holds_samples else read

@@ -150,8 +150,7 @@ class MeanRows(Gathered):
         super().__init__()
         self.key, self.by = by or weights, by
         self.uncertain = self.stamped = False
-        self.extra: list[Any] = []
-        self.labels: dict[str, int] = {}
+        self.extra, self.labels = list[Any](), dict[str, int]()
         self.named: list[str] = []
         self.place: Callable[[int], str] = str
 

@@ -189,3 +189,14 @@ def test_documents_may_begin_behind_their_dashes(run: Run, dashes: str, rows: in
     done = run("convert", "--to", "rpy_deg", "--start", "1", "--on-error", "skip", stdin=text)
     assert re.findall(f'^{dashes}{{"stamp": ([0-9]+)', done.out, re.MULTILINE) == [str(at) for at in range(2, rows)]
     assert done.err.splitlines()[-1] == f"frametool: stdin: 1 of {rows} rows skipped"
+
+
+@pytest.mark.parametrize("quote", ['"', "'"])
+@pytest.mark.parametrize("rows", [3, 100])
+@pytest.mark.parametrize("more", [(), ("--start", "0")], ids=" ".join)
+@pytest.mark.parametrize("form", ["json", "csv"])
+def test_a_stamp_between_quotes_is_the_same_text_in_another_format(run: Run, form: str, more: tuple[str, ...], rows: int, quote: str) -> None:
+    documents = (f"stamp: {quote}{at}.5{quote}\nxyz: [{at}, 5, 3]\nrpy: [0, 0, 7]\n" for at in range(rows))
+    done = run("convert", *more, "-f", form, stdin="---\n".join(documents))
+    ends = [line.rpartition(",")[2] if form == "csv" else json.loads(line)["stamp"] for line in done.out.splitlines()]
+    assert ends[form == "csv" :] == [f"{at}.5" for at in range(rows)]

@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from functools import cached_property
 from itertools import accumulate, chain, count, pairwise
-from operator import itemgetter
+from operator import attrgetter, itemgetter
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 import numpy as np
@@ -113,21 +113,20 @@ class Template:
         frames = [self._frames_of(entry) for entry in self.entries]
         named = {_text_of(node): node for node in chain(*frames) if node is not None}
         self._patterns |= {span: FRAME[self.json, node.quote] for span, node in named.items()}
-        cuts = {*self._patterns, *((node.start, node.end) for node in chain(*stamps))}
         anew, leaves = known.request.results.rewrite_records, dict[tuple[int, int], Node]()
+        span_of = _text_of if anew else attrgetter("start", "end")  # with a style, scalars are taken without quotes
+        cuts = {*self._patterns, *map(span_of, chain(*stamps))}
         if anew and self.regular:
             leaves = {_text_of(node): node for node in own} | named
         for leaf, pattern in () if known.is_long or (anew and not self.regular) else self._free_leaves():
-            # with a style, a stamp is taken with its quotes, others without
-            size = len(leaf.quote) if anew and (leaf.start, leaf.end) not in cuts else 0
-            span = leaf.start + size, leaf.end - size
+            size, span = len(leaf.quote) if anew else 0, span_of(leaf)
             if span[0] < span[1]:
                 leaves[span] = leaf
                 self._patterns.setdefault(span, pattern[size : len(pattern) - size])
         self.stretches, pieces = stretches_of(len(self.text), sorted(cuts.union(leaves if anew else ())), known.edits)
         at = dict(zip(self.stretches, count(), strict=False))
         self.numbers = tuple(at[_text_of(node)] for node in own)
-        self.stamps = tuple(tuple(at[node.start, node.end] for node in each) for each in stamps)
+        self.stamps = tuple(tuple(at[span_of(node)] for node in each) for each in stamps)
         self.named = [at[span] for span in named]
         order = {node.start: place for place, node in enumerate(named.values())}
         self.frames = [[None if node is None else order[node.start] for node in each] for each in frames]
