@@ -171,7 +171,7 @@ def solve_tree(
     root: the frame in which the others are expressed; default the first that is never a child
     fixed: a tree of exact edges, whose frames move as one body
     robust: reject outliers
-    Raises ValueInvalid: frames are not connected, an unknown root, undecided.
+    Raises ValueInvalid if frames are not connected, the root is unknown, or loops do not identify an outlier.
     """
     if not measurements:
         raise ValueInvalid("no measurements")

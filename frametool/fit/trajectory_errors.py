@@ -30,7 +30,7 @@ class Delta(NamedTuple):
     unit: str
 
     def __str__(self) -> str:
-        """Return it as `parse_delta` reads it."""
+        """Return the delta in the notation of `parse_delta`."""
         return f"{self.amount:g}{self.unit}"
 
     def along(self, each: Trajectory) -> Array | None:
@@ -56,7 +56,7 @@ def parse_delta(text: str, units: Sequence[str] = ("m", "s", "deg", "frames")) -
 
 
 def statistics(values: Array | None) -> Any:
-    """Return the statistics of numbers; None for None; std is the population's (n), p95 the linear percentile."""
+    """Return the statistics of numbers; None for None; std divides by n, p95 is interpolated linearly."""
     if values is None:
         return None
     sse = float((values**2).sum())

@@ -1,1 +1,1 @@
-"""Frame trees, stamps and lookups: knows geometry, no text and no files."""
+"""Frame trees, stamps and lookups, without formats and files."""

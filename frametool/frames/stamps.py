@@ -44,11 +44,9 @@ def whole_stamp(stamp_ns: Any) -> int:
 
 
 def parse_stamp(text: str) -> int:
-    """Read `12.5` (seconds), `500ms`, `12500000000ns` or `2024-05-01T12:00:00Z` as nanoseconds.
+    """Read `12.5` (seconds), `500ms`, `12500000000ns` or `2024-05-01T12:00:00Z` as nanoseconds; raises ValueInvalid.
 
-    Fractions of a nanosecond are rounded, halves to even: programs that count time in floats print them.
-
-    Raises ValueInvalid.
+    Fractions of a nanosecond, which programs print that store time in floats, are rounded, halves to even.
     """
     if match := re.fullmatch(_NANOSECONDS, text):
         return int(match[1])

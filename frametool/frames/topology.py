@@ -1,8 +1,9 @@
 """The rules of a tree, the errors for edges that break them, and snapshots; the path between two frames.
 
-One parent per frame, one pose in it, no cycle.  Each error is a BadTopology without a place: a tree raises it, a loader
-adds where both edges are, `check` lists it.  Static and moving trees both use the path; static parts are composed only
-once.  At a time without data the error names the edge that has none, the distance in time, and what has data.
+The rules are: one parent per frame, one pose in it, no cycle.  Each error is a BadTopology without a place: a tree
+raises it, a loader adds where both edges are, `check` lists it.  Static and moving trees both use the path; static
+parts are composed only once.  At a time without data the error names the edge that is furthest from having data, this
+distance in time, and the interval in which the path has data.
 """
 
 from __future__ import annotations

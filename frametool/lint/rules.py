@@ -134,7 +134,7 @@ WRITTEN_XYZW = frozenset(("quaternion", "xyzw", "rotation", "orientation", "tran
 class Statement(NamedTuple):
     """An edge, or one sample of it, and its place.
 
-    looks_w_first: it was written x, y, z, w with x = 1
+    looks_w_first: True if it was written x, y, z, w with x = 1
     """
 
     parent: str
