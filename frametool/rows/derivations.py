@@ -1,4 +1,4 @@
-"""Poses and records as they are written, for derivations: the numbers of a notation with what they are."""
+"""Derivations (--explain) of records: the numbers as they are written, then each step of their transform."""
 
 from __future__ import annotations
 
@@ -25,7 +25,11 @@ if TYPE_CHECKING:
 
 
 class ByTree(NamedTuple):
-    """Transform by a lookup: from `source`, or the frame of the record, at a time or the latest."""
+    """A transform by look-up.
+
+    source: the source frame; None for the frame of the record
+    at_ns: the time; None for that of the record, else the latest
+    """
 
     frames: Frames
     target: str
@@ -34,13 +38,13 @@ class ByTree(NamedTuple):
 
 
 def written_poses(source: Source, *, degrees: bool = False, normalize: bool = False) -> list[WrittenPose]:
-    """Read the poses of a text as they are written; raises as `read_poses` does."""
+    """Read the poses of a text with the numbers of their notation; raises as `read_poses` does."""
     request = Request(COMBINED, RowOptions(kind=POSE, degrees=degrees, normalize=normalize))
     return [_written_pose(record, request) for record in read_text(source, request).records]
 
 
 def _written_pose(record: Record, request: Request) -> WrittenPose:
-    """Return a record as it is written."""
+    """Return the pose of a record with the numbers of its notation."""
     shape, notation = record.shape, record.shape.notation
     written = WrittenPose(
         pose_of(record, request), notation, position=shape.position(record.values), inverse=shape.inverse
@@ -55,9 +59,10 @@ def _written_pose(record: Record, request: Request) -> WrittenPose:
 def derive_record(
     style: Style, way: ByTree | WrittenPose, source: Source, rows: RowOptions, *, timeless: bool = False
 ) -> Explanation:
-    """Derive where a record is in the target's frame.
+    """Derive the record of a text in the target's frame.
 
-    way: a lookup, or a pose.  source: text that holds one record.  timeless: the stamp of its header does not matter.
+    way: the look-up or the pose that moves it; source: text with one record
+    timeless: ignore the stamp in its header
     """
     request = Request(Operation(moves=True), rows)
     records = read_text(source, request).records
@@ -103,7 +108,7 @@ def derive_record(
 
 
 def _target_and_source(way: ByTree | WrittenPose, own: str | None) -> tuple[str, str]:
-    """Return target and source for a record; where it names its own frame, that must be the source."""
+    """Return target and source for a record; raises ValueInvalid if the record names another frame than the source."""
     if isinstance(way, WrittenPose):
         target, source = way.pose.parent or "a", way.pose.name
     else:

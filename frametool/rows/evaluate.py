@@ -1,4 +1,4 @@
-"""One block of rows through the operation: numbers read, checked, moved, written; faults collected, nothing lost."""
+"""Compute one block of rows as arrays: read and check its numbers, apply the operation, and collect the faults."""
 
 from __future__ import annotations
 
@@ -37,14 +37,16 @@ COLUMNS_REMEDY = "give --deg, or name the columns _deg"
 
 
 class Plan(NamedTuple):
-    """What is done to every row of one layout, as a request asks.
+    """The columns, the operation and the output of all rows of one layout.
 
-    shapes: the poses or points of a row, their numbers one after the other; names: of these numbers, for messages
-    pieces: the text of a result; null: what replaces each number of a row without one
-    edge_of: the pose that moves a row, or one of its shapes, by the name of the frame it is expressed in
+    shapes: the points or poses of a row; targets: the shapes of its results
+    names: the columns of all numbers of the shapes, for messages
+    pieces: the text of a result; null: if b"", nan is an empty cell
+    edge_of: returns the pose that moves a row, or one of its shapes, by the frame it is expressed in
     frame_column: the name of the column that names frames
-    degree_hints: for each shape, what to do if its angles are in degrees
-    categorical: reads words that stand for numbers, by column: zones; dms_columns: angles in degrees and minutes
+    degree_hints: for each shape, the remedy if its angles are in degrees
+    categorical: readers of words for numbers, such as UTM zones, by index; dms_columns: readers of cells that
+        `Shape.read` cannot read, such as degrees and minutes
     yaml: numbers need a point before the exponent
     """
 
@@ -64,7 +66,11 @@ class Plan(NamedTuple):
 
 @dataclass(slots=True)
 class State:
-    """What a block passes on to the next one: its last row, that row's frame, and the turns of each angle."""
+    """The state that a block passes on to the next.
+
+    previous: the row that the next one is compared with; frame: that of all rows; stamp_ns: that of the last row
+    angles: for each unwrapped angle its last value and the full turns added to it
+    """
 
     previous: Floats | None = None
     frame: str | None = None
@@ -73,16 +79,16 @@ class State:
 
 
 class Run:
-    """The steps of one block; rows are numbered as in the block.
+    """The computation of one block; rows are indices in the block.
 
-    reasons: row -> column and why it is bad; rows: those that have a result
-    columns, moved: the numbers read, and the components of the results; results, locked: the numbers that are written
-        of all rows, and 1 where angles are not unique
-    things: each shape of the rows, where its numbers begin among all, and these
-    mended: rows whose rotation was off and normalised; off: by how much the worst was
-    doubted: whether a row had an angle that looks like degrees; notes: warnings
-    absent: rows that have no result, and nothing is wrong with them: without numbers, before the first or after the
-        last time that is wanted, and the very first of velocities
+    reasons: for each bad row the column and the reason; rows: the rows that have a result
+    columns, moved: the numbers as read, and the components of the results
+    results, locked: (n, k) the numbers to write, and (n,) 1 in rows whose Euler angles are not unique
+    things: for each shape of the rows the shape, the index of its first number, and its columns
+    mended: rows whose rotation was normalised; off: the largest deviation from a rotation
+    doubted: an angle that looks like degrees was reported; notes: warnings
+    absent: rows without a result that are not bad: without numbers, outside the requested times, or the first of
+        velocities
     """
 
     def __init__(self, plan: Plan, block: Block, state: State) -> None:
@@ -109,29 +115,29 @@ class Run:
         self.rows = np.delete(np.arange(self.count), [*self.reasons, *self.absent])
         self._note_block()
         for column, period in plan.targets[0].angle_columns() if self.request.results.unwrap and len(self.rows) else ():
-            values = self.results[self.rows, column]  # full turns are added, so that no step is larger than half a turn
+            values = self.results[self.rows, column]  # add full turns, so that no step exceeds half a turn
             last, turns = state.angles.get(column, (values[0], 0.0))
             every = turns - np.cumsum(np.rint((values - np.concatenate([[last], values[:-1]])) / period))
             self.results[self.rows, column] = values + period * every
             state.angles[column] = float(values[-1]), float(every[-1])
 
     def _good(self) -> Ints:
-        """Return the rows that have a result as far as is known."""
+        """Return the rows that are neither bad nor absent so far."""
         return np.delete(np.arange(self.count), [*self.reasons, *self.absent])
 
     def _blame(self, rows: Ints | int, column: str, reason: str | FrametoolError) -> None:
-        """Keep the first reason why rows are bad."""
+        """Store why rows are bad, unless they have a reason already."""
         for row in np.ravel(rows).tolist():
             self.reasons.setdefault(row, (column, reason))
 
     def _note(self, row: int, number: int, about: str, sentence: str) -> None:
-        """Warn of one of a row's numbers."""
+        """Warn about one number of a row."""
         place_of = self.block.place_of
         place = (self.block.line_of(row), self.plan.names[number]) if place_of is None else place_of(row, number)
         self.notes.append(RowNote(place[0], about, sentence, place[1]))
 
     def _read(self) -> Floats:
-        """Read all numbers; those that are none are nan."""
+        """Return all numbers (n, c); nan where a cell cannot be read."""
         cells, plan = self.block.numbers, self.plan
         if not isinstance(cells, Spans):
             return cells
@@ -140,14 +146,14 @@ class Run:
         readers = [partial(shape.read, at) for shape in plan.shapes for at in range(shape.size)] if len(bad) else []
 
         def read(at: int) -> float:
-            """Read an angle, or a length where metres are wanted, which may say its own unit; words are read below."""
+            """Read a cell that is not a plain number; cells with words are read below."""
             text, column = cells.text(*divmod(at, width)).decode("utf-8", "replace").strip(" \t"), at % width
             reader = plan.dms_columns.get(column) or readers[column]
             return 0.0 if column in plan.categorical else reader(text)
 
         for at, reason in read_each(numbers.reshape(-1), bad.tolist(), read).items():
             self._blame(at // width, plan.names[at % width], reason)
-        for column, word in plan.categorical.items() if self.count else ():  # also those that look like numbers
+        for column, word in plan.categorical.items() if self.count else ():  # also words that look like numbers
             own = coded(Spans(cells.data, cells.starts[:, column], cells.ends[:, column]))
             numbers[:, column], reasons = own.numbers(word)
             for row, reason in reasons.items():
@@ -155,7 +161,7 @@ class Run:
         return numbers
 
     def _check_covariances(self) -> None:
-        """Refuse rows whose covariance is invalid; sigmas cannot be negative."""
+        """Refuse rows with an invalid covariance, a negative sigma, or a scale that is not positive."""
         for shape, first, _ in self.things:
             at = first + shape.own_size
             for size in () if self.operation.reads_scale(shape) else shape.covariance:
@@ -170,7 +176,7 @@ class Run:
                 at += size
 
     def _note_block(self) -> None:
-        """Warn of what holds for the block: names and covariances of its results, and zones of UTM."""
+        """Warn once per block about lost names, projected matrices, wide covariances, and the zones of UTM."""
         line_of, shapes, targets, lost = self.block.line_of, self.plan.shapes, self.plan.targets, self.block.names.lost
         self.notes += map(RowNote.of_lost_name, map(line_of, lost), lost.values())
         if shapes and shapes[0].notation is UPPER_ROWS and self.off > PROJECTED_IN_SILENCE:
@@ -181,7 +187,7 @@ class Run:
             columns = [np.broadcast_to(np.asarray(part), self.count) for part in parts[-36:]]
             with np.errstate(all="ignore"):
                 wide = np.flatnonzero(columns[21] + columns[28] + columns[35] > uncertainty.WIDE**2)
-            for row in wide.tolist():  # the first whose turn is too uncertain for the first order
+            for row in wide.tolist():  # report the first row whose rotation is too uncertain for the first order
                 if message := uncertainty.doubt([float(column[row]) for column in columns]):
                     self.notes.append(RowNote(line_of(row), uncertainty.WIDE_RULE, message))
                     break
@@ -194,7 +200,7 @@ class Run:
                 self.notes += zone_notes(place, [*self.results[self.rows].T], lambda at: line_of(int(self.rows[at])))
 
     def _mover(self, at: int) -> Rigid | None:
-        """Return the pose that moves one of the points or poses of the rows: of its frame, at its time, or none."""
+        """Return the pose that moves shape `at` of the rows, by frame or at their stamps; None if nothing moves it."""
         plan, operation, timed, count = self.plan, self.operation, self.request.timed, self.count
         (frames, numbers), stamps = self.block.frames[at], self.block.stamps
         times = stamps[at] if timed is not None and len(stamps) > at else None
@@ -205,7 +211,7 @@ class Run:
         return self._movers(self.block.frames[at].of_rows(count), frames, times)
 
     def _movers(self, codes: Ints, frames: Sequence[Any], times: Ints | None) -> Rigid:
-        """Return the pose of each row by the number of its frame, or at its stamp; a row that has none is bad."""
+        """Return the pose of each row by its frame, or at its stamp; a row without such a pose is bad."""
         plan, timed, count = self.plan, self.request.timed, self.count
         if timed is None or times is None:
             edges: list[Rigid] = []
@@ -224,7 +230,7 @@ class Run:
             except FrametoolError as error:
                 self._blame(some, plan.frame_column, error)
                 continue
-            for row in some[np.isnan(poses[6, some])].tolist():  # asked singly, it says why
+            for row in some[np.isnan(poses[6, some])].tolist():  # a single look-up raises the reason
                 try:
                     timed.one(frame, int(times[row]))
                     self._blame(row, timed.column, "no data")
@@ -233,7 +239,7 @@ class Run:
         return tuple(poses)  # type: ignore[return-value]
 
     def _compute(self) -> list[Components]:
-        """Apply the operation to each point or pose of the rows."""
+        """Return the components of the result for each point or pose of the rows."""
         operation = self.operation
         if operation.of == PAIR or not self.things:
             poses = [
@@ -244,29 +250,29 @@ class Run:
         needs_time = operation.formula is not None and operation.formula.needs_time
         found, mover = [], None
         for at, (shape, first, numbers) in enumerate(self.things):
-            if at < len(self.block.frames):  # the rows of a table have one stamp and one frame for all their points
+            if at < len(self.block.frames):  # in a table all points of a row share one stamp and frame
                 mover = self._mover(at)
             parts = operation.result(
                 shape, numbers, mover, arrays, rotation=partial(self._rotation, shape, first),
                 before=self._before if operation.looks_back else None,
                 times_ns=self.block.stamps[at] if needs_time else None,
             )  # fmt: skip
-            if operation.formula is not None:  # what an expression makes of no row is that of each
+            if operation.formula is not None:  # a result without inputs from rows is the same in all rows
                 parts = tuple(np.full(self.count, part) if type(part) is float else part for part in parts)
             found.append(parts)
         return found
 
     def _before(self, pose: Rigid) -> tuple[list[Any], Floats]:
-        """Return the good row before each row, or the first of all, and the row; and the time between the two.
+        """Return the pose to compare with (of the good row before, or the first), the own one, and the seconds between.
 
-        The very first row's is itself, and then both are exact.
+        The first row of all is compared with itself, and then both count as exact.
         """
         good, state, seconds = self._good(), self.state, np.ones(self.count)
         itself = good[: state.previous is None]
         if not len(good):
             return [pose, pose], seconds
         full = np.stack([np.broadcast_to(np.asarray(part, np.float64), self.count) for part in pose])
-        counts = self.request.counts if not self.plan.frame_column else lambda _: False  # a table has no counters left
+        counts = self.request.counts if not self.plan.frame_column else lambda _: False  # already removed in a table
         frames = [None if each and counts(each) else each for each in self.block.frames[0].texts]
         codes = self.block.frames[0].of_rows(self.count)[good]
         if state.previous is None:
@@ -281,7 +287,7 @@ class Run:
         if len(before) > len(full):
             what = "what it is compared with has a covariance, which this one has not"
             self._blame(good[: None if self.operation.of == START else 1], "", what)
-        before = np.append(before, np.zeros(UNCERTAIN - EXACT))[: len(full)]  # without a covariance it is exact
+        before = np.append(before, np.zeros(UNCERTAIN - EXACT))[: len(full)]  # without a covariance: exact
         earlier = np.repeat(before[:, None], self.count, axis=1)
         if self.operation.of != START:
             later = np.arange(good[0] + 1, self.count)
@@ -293,7 +299,7 @@ class Run:
         return [tuple(earlier), tuple(full)], seconds
 
     def _seconds(self, good: Ints, stamps: Ints) -> Floats:
-        """Return the time since the good row before each; the very first row has no velocity and no result."""
+        """Return the seconds since the good row before each; the first row of all has no velocity and is absent."""
         known = self.state.stamp_ns
         before = np.concatenate([[stamps[0] - BILLION if known is None else known], stamps[:-1]])
         steps = stamps - before
@@ -308,7 +314,7 @@ class Run:
         return np.where(steps > 0, steps, BILLION) / BILLION
 
     def _rotation(self, shape: Shape, first: int, numbers: Components) -> Components:
-        """Return the checked quaternions of a shape whose numbers begin at the column `first`."""
+        """Return the checked quaternions of a shape whose numbers begin at column `first`."""
         if shape.notation is None:
             return shapes.IDENTITY
         values, names = list(shape.rotation(numbers)), self.plan.names[first : first + shape.size]
@@ -341,7 +347,7 @@ class Run:
         return found.quaternions
 
     def _take_as_meant(self, rule: BatchRule, values: list[Floats], places: Sequence[int], rough: set[int]) -> None:
-        """Replace the rotations of rows that are off by no more than the digits they are written with."""
+        """Repair rotations whose deviation is no larger than the rounding of their printed digits."""
         rows, cells = np.array(sorted(rough), np.int64), cast("Spans", self.block.numbers)
         own = [column[rows] for column in values]
         halves = [half_units(Spans(cells.data, cells.starts[rows, at], cells.ends[rows, at])) for at in places]
@@ -356,7 +362,7 @@ class Run:
             values[at][rows] = np.where(meant, numbers, own[at])
 
     def _results(self) -> tuple[Floats, Ints]:
-        """Return the results as rows of numbers, and where angles are not unique; what is not finite is bad."""
+        """Return the results as rows of numbers, and where angles are not unique; rows that are not finite are bad."""
         numbers: list[Floats] = []
         locked = np.zeros(self.count, np.int64)
         for target, parts in zip(self.plan.targets, self.moved, strict=True):
@@ -366,26 +372,26 @@ class Run:
                     self._blame(row, "", LEAVES_PLANE.format(name, number[row]))
             if target.notations and (flags := target.locked(parts)) is not None:
                 locked |= flags
-        # without rows nothing moves them, so that covariances are missing among the numbers
+        # without rows there are no movers, and the covariances are missing in `numbers`
         width = len(numbers) if self.count else sum(target.size for target in self.plan.targets)
         results = np.empty((self.count, width))
         for column, number in enumerate(numbers):
             results[:, column] = number
-        results += 0.0  # none is -0.0
+        results += 0.0  # no -0.0
         if not np.isfinite(results.sum()):
-            wrong = np.isinf(results) if self.operation.shown else ~np.isfinite(results)  # nan may be a formula's
+            wrong = np.isinf(results) if self.operation.shown else ~np.isfinite(results)  # nan of a formula is valid
             for row in np.flatnonzero(wrong.any(axis=1)).tolist():
                 if row not in self.reasons and row not in self.absent:
                     self._blame(row, *self._why_not_finite(row))
         return results, locked
 
     def _why_not_finite(self, row: int) -> tuple[str, str | FrametoolError]:
-        """Return the column and the reason why a row has no finite result."""
+        """Return the column and the reason for a row without a finite result."""
         formula, column = self.operation.formula, ""
         try:
             for at, (shape, first, columns) in enumerate(self.things):
                 own = tuple(float(each[row]) for each in columns)
-                if formula is not None:  # for one row alone, it says so itself
+                if formula is not None:  # for a single row it raises the reason
                     stamp_ns = int(self.block.stamps[at][row]) if formula.needs_time else None
                     checked = lambda numbers, shape=shape: checked_rotation(shape, numbers, normalize=True)[0]  # noqa: E731
                     self.operation.result(shape, own, None, floats, rotation=checked, times_ns=stamp_ns)
@@ -401,15 +407,15 @@ class Run:
         return "", "the result is not finite: the numbers are too large"
 
     def refuse(self, wrong: Flags, reason: str) -> None:
-        """Take results back: these rows are bad."""
+        """Mark rows as bad although they have a result."""
         if wrong.any():
             self._blame(self.rows[wrong[self.rows]], "", reason)
             self.rows = self.rows[~wrong[self.rows]]
 
     def settled(self, before: int | None = None) -> tuple[Ints, Floats]:
-        """Return the rows that stay, and their numbers: nan in those that have none on purpose, or are null.
+        """Return the rows to write and their numbers; nan in rows without a result that are kept.
 
-        before: the place up to which rows stay
+        before: the position at which the output ends; None for all rows
         """
         if before is None and len(self.rows) == self.count:
             return self.rows, self.results
@@ -425,16 +431,17 @@ class Run:
 
     @property
     def end(self) -> int | None:
-        """Return the place of the bad row that ends the stream, if there is one."""
+        """Return the position of the bad row that ends the stream; None if there is none."""
         if self.request.on_error != STOP or not (self.reasons or self.block.broken):
             return None
         first: int = min([*self.block.places[[*self.reasons]].tolist(), *(place for place, _ in self.block.broken)])
         return first
 
     def groups(self, parts: Mapping[Any, Spans], before: int | None = None) -> list[tuple[Ints, list[Spans]]]:
-        """Return what is written before a place, else all that stays: rows with their results, and what passes.
+        """Return the spans to write: those of rows with their results, and those of unchanged text.
 
-        parts: spans (n,) that the pieces of results refer to
+        parts: the spans (n,) that pieces refer to
+        before: the position at which the output ends; None for `end`
         """
         before = self.end if before is None else before
         (rows, results), locked, plan, places = self.settled(before), self.locked, self.plan, self.block.places
@@ -451,11 +458,11 @@ class Run:
         return [*groups, texts_as_rows(unchanged)] if unchanged else groups
 
     def parts_of(self, row: int) -> list[tuple[float, ...]]:
-        """Return the components of what became of each point or pose of a row."""
+        """Return the components of the result for each point or pose of a row."""
         columns = ([np.broadcast_to(part, self.count) for part in parts] for parts in self.moved)
         return [tuple(float(column[row]) for column in each) for each in columns]
 
     def faults(self) -> list[Fault]:
-        """Return what is wrong, line by line."""
+        """Return the faults of the block in the order of its lines."""
         found = [Fault(self.block.line_of(row), *why) for row, why in self.reasons.items()]
         return sorted([*map(itemgetter(1), self.block.broken), *found], key=lambda each: (each.line, each.column))

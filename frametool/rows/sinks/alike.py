@@ -1,7 +1,7 @@
-"""Records that are written alike, as rows: a record is a row whose columns are its scalars.
+"""Write results of records with the same layout as rows, whose columns are the scalars of the records.
 
-What such a row becomes in another format is seen from one whose scalars are marks, by the way that single results take;
-what is invalid, or worth telling, takes that way itself.
+The text of such a row is learned from one result in which every scalar is a mark.  Records with a warning or an error
+are written one by one.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ QUATERNION = notation("quaternion")
 
 
 class RecordRows:
-    """Make rows of records that are written alike."""
+    """Make rows from the results of records that share a template."""
 
     def __init__(self, request: Request, style: Style, *, is_yaml: bool) -> None:
         """Begin without templates."""
@@ -43,12 +43,12 @@ class RecordRows:
         self._plans: dict[Template, tuple[Plan, list[Marked]]] = {}
 
     def plan(self, template: Template) -> Plan:
-        """Return what is done to the records of a template; without marks where their results are not made of them."""
+        """Return the plan for the records of a template, without marks if its results need more than the scalars."""
         if template in self._plans:
             return self._plans[template][0]
         plan = plan_of(template, self.request, yaml=self.is_yaml)._replace(pieces=())
         entries, targets, found = template.entries, list[Shape](), list[Marked]()
-        # few plain numbers, and no place on the Earth
+        # few plain numbers, and no position on the Earth
         is_plain = template.regular and len({entry.record.path for entry in entries}) == len(entries) <= MOST_ENTRIES
         is_simple = is_plain and not any(
             self.request.operation.reads_scale(record.shape) or record.shape.place or record.keys.placed
@@ -66,10 +66,13 @@ class RecordRows:
         return self._plans[template][0]
 
     def take(self, cut: Cut, run: Run, called: Called) -> tuple[list[AlikeRows], set[int]]:
-        """Return the rows of a run in batches, and which of them are unclear; called: the frames of all."""
+        """Return the rows of a run in batches, and the rows that must be written one by one.
+
+        called: the frames of all records, as `Cut.frames` returns them
+        """
         template, marked, parts = cut.template, self._plans[cut.template][1], run.block.parts
         left = {*run.rows[run.locked[run.rows] != 0].tolist()} if marked else {*run.rows.tolist()}
-        if self.style.format == "yaml":  # in which a null has lines of its own
+        if self.style.format == "yaml":  # in which the text of null may differ
             for cells in (parts[at] for at, node in template.leaves if not node.quote):
                 left |= {*np.flatnonzero(cells.data[cells.starts] == ord("n")).tolist()}
         stamps = []
@@ -94,7 +97,7 @@ class RecordRows:
         return batches, left.intersection(run.rows.tolist())
 
     def _target(self, own: Shape, kind: str) -> Shape:
-        """Choose which numbers of a result are written."""
+        """Return the shape in which the numbers of a result are written."""
         if kind not in (POSE, ROTATION):
             return own
         if not own.notations:
@@ -104,7 +107,7 @@ class RecordRows:
         return target_of(self.style, placed=own.unit is not None or own.whole)
 
     def _marked(self, template: Template, at: int, target: Shape) -> Marked | None:
-        """Return the result of an entry whose scalars are marks; None where it is not made of them alone."""
+        """Return the result of an entry with marks for its scalars; None if it needs more than these."""
         entry, operation, style = template.entries[at], self.request.operation, self.style
         record, shape, is_spelled = entry.record, entry.record.shape, style.format in SPELLED
         text, begin = "", 0
@@ -115,7 +118,7 @@ class RecordRows:
         if operation.formula is None:
             size = 7 if shape.kind in (POSE, ROTATION) else len(NUMBERS[: shape.own_size])
             carried = 0 if shape.rewritten else sum(shape.covariance)
-        else:  # of numbers alone, what was the row's own counts for nothing
+        else:  # for numbers alone the pose of the row is ignored
             size, carried = 3 if operation.result_kind(shape.kind) in (POINT, VECTOR) else 7, 0
         parts = (*NUMBERS[:size], *(as_rows.MORE_NUMBERS + at for at in range(len(operation.extras(shape)) + carried)))
         shown = entry._replace(
@@ -133,10 +136,10 @@ class RecordRows:
         there = str([*value.pose, value.extras] if isinstance(value, Result) else value)
         quotes = {mark: node.quote for at, (_, node) in enumerate(template.leaves) if (mark := leaf_mark(at)) in there}
         found = Marked(value, numbers, len(written), quotes=quotes, is_json=template.json)
-        if record.stamp_ns is not None:  # in its header
+        if record.stamp_ns is not None:  # the stamp of its header
             begins = [template.root.at(path).start for path in record.stamps[:2]]
             found = found._replace(stamp=tuple(at for at, node in template.leaves if node.start in begins))
-        # a scalar that is a stamp is read, unless it stays as it is written
+        # a scalar that is a stamp is parsed, unless its text is copied
         extras = value.extras if isinstance(value, Result) else value
         rest = {key: each for key, each in extras.items() if each != STAMP_NS}
         if (key := stamp_key(rest)) and not (is_spelled and type(rest[key]) is not int):
@@ -152,5 +155,5 @@ class RecordRows:
                 in_columns = cells_of(value, style) if style.format == "csv" else cells
                 dump_json(in_columns, lambda each: f"{numbers[repr(each)]}")
             except KeyError:
-                return None  # a number of it is none of the columns
+                return None  # one of its numbers has no column
         return found

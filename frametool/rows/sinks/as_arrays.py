@@ -1,7 +1,7 @@
-"""Columns of numbers and texts on their way into a file of columns: each gets one type, as all its cells allow.
+"""Write columns of numbers and texts into files of columns; each column gets one type that fits all its cells.
 
-Cells of text and the values of records wait until so many rows are there; then their types are settled.  What a format
-has no place for is left out, with one warning.
+Cells of text and values of records wait until `sizes.TYPED` rows are known, from which the types are chosen.  Columns
+that a format cannot hold are left out, with one warning.
 """
 
 from __future__ import annotations
@@ -33,11 +33,11 @@ if TYPE_CHECKING:
     from frametool.grammar.result import Style
     from frametool.rows.batch import Cells, RowPoses
 
-SPARE = 64  # characters that a text may have where not all rows were seen
+SPARE = 64  # least number of characters per text if more rows may follow
 DOUBLE, FLAG = np.dtype(np.float64), np.dtype(np.bool_)
-EXACT = 1 << 53  # whole numbers below are floats to the bit
-LIMITS, SAFE = np.iinfo(np.int64), 18  # digits that are surely within
-# of a type only if each is written as a number of it is: 007 and +5 stay text, and what would lose digits
+EXACT = 1 << 53  # smaller integers are exact as floats
+LIMITS, SAFE = np.iinfo(np.int64), 18  # an integer with so many digits is within LIMITS
+# cells of each type, in canonical spelling only: 007, +5 and numbers that would lose digits remain text
 PATTERNS = {
     np.dtype(np.int64): r"-?(?:0|[1-9][0-9]{0,18})",
     DOUBLE: r"-?(?:0|[1-9][0-9]{0,14})(?:\.[0-9]+)?(?:[eE][-+]?[0-9]+)?",
@@ -48,7 +48,7 @@ READS: dict[Kind, Any] = {np.dtype(np.int64): int, DOUBLE: float, FLAG: "true"._
 
 
 def fit(texts: Sequence[str], kind: Kind) -> bool:
-    """Return True if all cells are written as numbers or truth values of a type are."""
+    """Return True if all cells are spelled as numbers or booleans of a type."""
     if not all(map(re.compile(PATTERNS[kind]).fullmatch, texts)):
         return False
     return kind.kind not in WHOLE or all(LIMITS.min <= int(text) <= LIMITS.max for text in texts if len(text) > SAFE)
@@ -58,7 +58,7 @@ class ColumnsWriter:
     """Write blocks of columns into a file of a format; the columns are those of the first rows."""
 
     def __init__(self, style: Style, module: Any = None) -> None:
-        """Choose the format; module: what creates its writer, where that is not the format's own."""
+        """Choose the format; module: has the `create` to use instead of that of the format's own module."""
         self.style = style
         self.module: Any = module or import_module(FORMATS[style.format].writer)
         self.has_nulls: bool = getattr(self.module, "NULLS", False)
@@ -68,7 +68,7 @@ class ColumnsWriter:
         self.writer: ColumnWriter | None = None
 
     def of_columns(self, size: int, made: Mapping[str, Made]) -> bytes:
-        """Return what is written of a block of so many rows, perhaps nothing yet."""
+        """Add a block of `size` rows; return the bytes that can be written now, perhaps none."""
         self.waiting.append((size, made))
         if self.writer is None:
             is_open = any(not is_typed(each.values) for each in made.values())
@@ -78,7 +78,7 @@ class ColumnsWriter:
         return b"".join(self._written(self.writer))
 
     def end(self) -> Iterator[bytes]:
-        """Yield what waits, what comes behind the last block, and warn of what was left out."""
+        """Yield the bytes of waiting blocks and the end of the file; warn about columns that were left out."""
         self.writer = self.writer or self._begin(is_all=True)
         yield from self._written(self.writer)
         yield from self.writer.end()
@@ -87,7 +87,7 @@ class ColumnsWriter:
             warn(f"{self.style.format}: {names} left out: {reason}")
 
     def _written(self, writer: ColumnWriter) -> Iterator[bytes]:
-        """Yield what is written of the blocks that wait."""
+        """Yield the bytes of the waiting blocks."""
         known = {column.name for column in self.columns}
         for size, made in self.waiting:
             for name in made.keys() - known:
@@ -99,7 +99,7 @@ class ColumnsWriter:
         self.waiting = []
 
     def _begin(self, *, is_all: bool) -> ColumnWriter:
-        """Choose the columns and their types, and begin the file; is_all: no other rows come."""
+        """Choose the columns and their types and open the file; is_all: no more rows follow."""
         blocks = [made for size, made in self.waiting if size] or [made for _, made in self.waiting[-1:]]
         for name in dict.fromkeys(name for made in blocks for name in made):
             parts = [made[name].values for made in blocks if name in made]
@@ -107,7 +107,7 @@ class ColumnsWriter:
             if column.kind is None and not is_all:
                 column = column._replace(longest=max(SPARE, 2 * column.longest))
             reason = self._misfit(column)
-            # doubles are read everywhere
+            # readers of all formats know doubles
             as_cells = not ("texts" in FORMATS[self.style.format].writes or all(map(is_typed, parts)))
             if (reason or as_cells) and _is_exact(column.kind, parts):
                 column = column._replace(kind=DOUBLE)
@@ -126,14 +126,14 @@ class ColumnsWriter:
         return writer
 
     def _misfit(self, column: OutColumn) -> str:
-        """Return the reason why a column has no place in the format; "" where it has one."""
+        """Return the reason why the format cannot hold a column; "" if it can."""
         if column.kind is None and "texts" not in FORMATS[self.style.format].writes:
             return "it holds numbers"
         reason: str = self.module.misfit(column) if hasattr(self.module, "misfit") else ""
         return reason
 
     def _column(self, name: str, parts: Sequence[Cells], *, has_gaps: bool) -> OutColumn:
-        """Return of which type a column is."""
+        """Choose the type of a column from its cells."""
         if parts and all(map(is_typed, parts)):
             own: Kind = parts[0].dtype.newbyteorder("=")  # type: ignore[union-attr]
             return OutColumn(name, DOUBLE if own.kind == "f" and own.itemsize > DOUBLE.itemsize else own)
@@ -150,7 +150,7 @@ class ColumnsWriter:
         return OutColumn(name, None, None, longest, is_json)
 
     def _typed(self, column: OutColumn, made: Made) -> Made:
-        """Return a column of a block in its type; raises ValueInvalid for a cell that is of another one."""
+        """Return a column of a block converted to its type; raises ValueInvalid for a cell that does not fit."""
         cells, kind = made.values, column.kind
         if kind is None:
             if not column.is_json:
@@ -182,41 +182,41 @@ class ColumnsWriter:
 
 
 def _is_exact(kind: Kind | None, parts: Sequence[Any]) -> bool:
-    """Return True if whole numbers are floats to the bit."""
+    """Return True if a column holds integers that are exact as floats."""
     if kind is None or kind.kind not in WHOLE:
         return False
     numbers: list[Any] = []
     for part in parts:
         known = plain_cells(part) if not (is_typed(part) and part.size) else [part.min(), part.max()]
         numbers += [int(each) for each in known if each is not None]
-    return all(-EXACT < number < EXACT for number in numbers)  # of the least int64 there is no absolute value
+    return all(-EXACT < number < EXACT for number in numbers)  # abs() of the least int64 overflows
 
 
 class ArrayWriter(PoseWriter):
-    """Write blocks of poses, points, vectors, twists or wrenches one after the other.
+    """Write blocks of poses, points, vectors, twists or wrenches as columns.
 
-    The columns: frames where there are names, numbers, stamps, and what is not ours.
+    In this order: names of frames if there are any, numbers, stamps, other columns.
     """
 
     def __init__(self, style: Style, first: RowPoses) -> None:
-        """Choose the format, and take of the first block what a row is."""
+        """Choose the format; the first block determines the kind of all rows."""
         super().__init__(style, first)
         self.file = ColumnsWriter(style)
         self.names = [*self.target.position_columns, *self.target.names]
         self.names = [*(six_names(self.kind) if self.kind in SIX else self.names), *self.extras]
-        self.file.of_columns(0, {name: Made(np.empty(0)) for name in self.names})  # what a file without rows has
+        self.file.of_columns(0, {name: Made(np.empty(0)) for name in self.names})  # the columns of a file without rows
 
     def of_block(self, block: RowPoses) -> bytes:
-        """Return what is written of a block; numbers are metres and x y z w, nan in rows without a result."""
+        """Return the bytes of a block; its numbers are metres and quaternions x y z w, nan in rows without a result."""
         self.settle(block)
         return self.file.of_columns(len(block.numbers), self._made(block))
 
     def end(self) -> Iterator[bytes]:
-        """Yield what comes behind the last block."""
+        """Yield the rest of the file."""
         return self.file.end()
 
     def _made(self, block: RowPoses) -> dict[str, Made]:
-        """Return the columns of a block by name, its numbers in the notations that are written."""
+        """Return the columns of a block by name, with rotations in the notations of the style."""
         size, made, place = len(block.numbers), dict[str, Made](), self.target.place
         for name, frames in (("name", block.names), ("parent" if self.kind == POSE else "frame", block.parents)):
             if any(frames):

@@ -1,4 +1,4 @@
-"""Blocks of poses and points on their way into a recording: which messages they become, and what these cannot hold."""
+"""Write blocks of poses and points as messages of a recording, and warn about what these cannot hold."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     from frametool.grammar.result import Style
     from frametool.text.spans import Floats, Ints
 
-KINDS_OF = {POSE: ("pose", "tf", "path", "fix"), POINT: ("point", "fix")}  # what rows can become
-FRAMES = "world", "body"  # where nothing says them
+KINDS_OF = {POSE: ("pose", "tf", "path", "fix"), POINT: ("point", "fix")}  # the messages for each kind of row
+FRAMES = "world", "body"  # if neither rows nor options name them
 NAME = "name"
 ANTENNA = "gps"  # the frame of a fix is that of its antenna
 LLA = "lla"
@@ -30,12 +30,12 @@ NO_STAMPS = "{}: the rows have no stamps, and messages need them; `convert --sta
 
 
 class RecordingWriter(SingleWriter):
-    """Write blocks of poses or points as messages of one topic, or of several that go side by side."""
+    """Write blocks of poses or points as messages, on one topic, or on several at the same time."""
 
     def __init__(self, style: Style, first: RowPoses) -> None:
-        """Choose the messages for what the rows of the first block are.
+        """Choose the messages for the kind of rows in the first block.
 
-        Raises ValueInvalid for rows and notations that no message holds, FileProblem without the extra.
+        Raises ValueInvalid for rows and notations that no message can hold, FileProblem if the extra is not installed.
         """
         super().__init__(style, first)
         asked, kind = style.recording, self.kind
@@ -48,7 +48,7 @@ class RecordingWriter(SingleWriter):
             raise ValueInvalid(f"{style.format} holds places by lat lon alt only; leave --to {style.place.name} out")
         if any(each.spec != "quaternion" for each in style.notations):
             raise ValueInvalid(f"{style.format} writes rotations in its own way; leave --to out")
-        usual: tuple[str, ...] = () if kind == POINT else ("pose",)  # of points the frame decides
+        usual: tuple[str, ...] = () if kind == POINT else ("pose",)  # for points decided by the frame
         if style.place is not None or (kind == POSE and asked.frames and not asked.topic):
             usual = ("pose", "tf") if style.place is None else ("fix",)
         self.kinds = asked.kinds or usual
@@ -59,11 +59,11 @@ class RecordingWriter(SingleWriter):
         self.file = RecordingFile(style.format, asked.folder)
         self.dropped |= dict.fromkeys(self.extras)
         self.path: list[tuple[str, Ints, Floats]] = []
-        self.lost: dict[str, None] = {}  # names of frames that poses are of
-        self.is_named = True  # whether all rows say what they are seen from
+        self.lost: dict[str, None] = {}  # names of child frames that no message holds
+        self.is_named = True  # True if all rows name their parent
 
     def of_block(self, block: RowPoses) -> bytes:
-        """Write the messages of a block; their bytes come at the end."""
+        """Add the messages of a block; their bytes are written by `end`."""
         if not (size := len(block.numbers)):
             return b""
         stamps, fmt = block.stamps_ns, self.style.format
@@ -93,7 +93,7 @@ class RecordingWriter(SingleWriter):
         return b""
 
     def end(self) -> Iterator[bytes]:
-        """Yield the recording, and warn of what was left out or made up."""
+        """Yield the recording, and warn about what was left out or assumed."""
         fmt = self.style.format
         if self.path:  # all poses in one message, at the last stamp
             parents = {parent for parent, _, _ in self.path}
@@ -132,9 +132,9 @@ class RecordingWriter(SingleWriter):
         return [(parents[at] or parent, names[at] or child) for at in range(size)]
 
     def _numbers(self, block: RowPoses) -> Floats:
-        """Return position and quaternion, a point, or lat, lon, alt, of each row as they are written.
+        """Return the numbers of each row in a message: a position and quaternion, a point, or lat, lon, alt.
 
-        Places are as they were read where nothing changed them.
+        Geodetic positions that nothing moved are returned as they were read.
         """
         if "fix" in self.kinds:
             if not {*block.parents} <= {*EARTH_FRAMES}:
@@ -150,4 +150,4 @@ class RecordingWriter(SingleWriter):
         if self.kind == POSE and not self.style.keep_sign:
             x, y, z, w = quaternion.unit(*numbers[:, 3:].T, arrays)  # type: ignore[call-arg]
             numbers[:, 3:] = np.column_stack(quaternion.from_quaternion(x, y, z, w, arrays))
-        return numbers + 0.0  # none is -0.0
+        return numbers + 0.0  # no -0.0

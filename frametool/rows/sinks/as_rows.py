@@ -1,10 +1,10 @@
-"""Poses, points and vectors in blocks to any format of text that writes them.
+"""Write blocks of poses, points and vectors in any text format.
 
-What a row of text looks like is said by the format (`ROWS`), or learned from what it writes for one; where neither can
-be, the format writes row after row as it writes single results.  Other columns go along where they have a place.
+The text of a row is defined by the format (`ROWS`), or learned from the text of one result; for other formats results
+are written one by one.  Other columns are written if the format has a place for them.
 
-Of rows that are written alike one result is written, in which all that differs is a mark; the numbers, names and other
-scalars of rows then take the places of the marks.
+To learn a row, one result is written with marks in place of everything that differs from row to row; each mark is then
+replaced by the numbers, names and other scalars of all rows.
 """
 
 from __future__ import annotations
@@ -61,14 +61,14 @@ NUMBERED = "without stamps, poses are numbered in seconds: 0, 1, 2 .."
 
 
 class PoseWriter(ResultWriter):
-    """Write blocks of poses, points, vectors, twists or wrenches one after the other: what all such writers know.
+    """Base of the writers of blocks of poses, points, vectors, twists or wrenches.
 
-    kind, placed, extras: what a row is, whether poses have positions, and the names of more numbers with each
-    target: which numbers of a result are written
+    kind: of each row; placed: poses have positions; extras: the names of further numbers
+    target: the shape in which the numbers of a result are written
     """
 
     def __init__(self, style: Style, first: RowPoses) -> None:
-        """Take the style, and of the first block what a row is."""
+        """Store the style; the first block determines the kind of all rows."""
         self.style, self.kind, self.extras = style, first.kind, first.more
         self.placed = first.placed or first.kind != POSE
         self.target = target_of(style, first.kind, placed=self.placed)
@@ -78,7 +78,7 @@ class PoseWriter(ResultWriter):
         return tuple(map(np.ascontiguousarray, block.numbers.T))
 
     def settle(self, block: RowPoses) -> None:
-        """Refuse positions of another frame than the Earth's, if these are wanted; the first may be the origin."""
+        """Refuse positions that are not in ECEF if geodetic ones are wanted; the first may become the origin."""
         if self.style.place is None or not len(block.numbers):
             return
         from frametool.grammar.place import check_in_ecef
@@ -89,10 +89,10 @@ class PoseWriter(ResultWriter):
 
 
 class SingleWriter(PoseWriter):
-    """Write blocks of poses, points or vectors as the format does for single results."""
+    """Write blocks of poses, points or vectors with the format's writer of single results."""
 
     def __init__(self, style: Style, first: RowPoses) -> None:
-        """Take the style and the first block; raises ValueInvalid for what the format does not hold."""
+        """Store the style and the kind of rows; raises ValueInvalid if the format cannot hold them."""
         super().__init__(style, first)
         if (kind := first.kind) in SIX:
             raise ValueInvalid(f"{style.format} is not written of rows of a {kind}; write csv, json or yaml")
@@ -102,7 +102,7 @@ class SingleWriter(PoseWriter):
         self.first: Any = None
 
     def of_block(self, block: RowPoses) -> bytes:
-        """Return the text of a block of poses; numbers are metres and x y z w."""
+        """Return the text of a block; its numbers are metres and quaternions x y z w."""
         if not len(block.numbers):
             return b""
         self.settle(block)
@@ -114,11 +114,11 @@ class SingleWriter(PoseWriter):
         if self.first is None:
             self.first = results[0]
             return write(results, self.style).encode()
-        known = write([self.first], self.style)  # the text of several begins with that of the first
+        known = write([self.first], self.style)  # the text of several begins with that of the first alone
         return write([self.first, *results], self.style)[len(known) :].encode()
 
     def end(self) -> Iterator[bytes]:
-        """Warn in one line of what was left out or made up."""
+        """Warn in one line about what was left out or assumed."""
         left = [words for words in LOSABLE if words in self.dropped]
         if others := self.dropped.keys() - {*LOSABLE}:
             left.append(listing(others, MOST_NAMED))
@@ -128,10 +128,10 @@ class SingleWriter(PoseWriter):
 
 
 class TextWriter(SingleWriter):
-    """Write blocks of poses in a format that says what its rows are."""
+    """Write blocks of poses in a format that defines the text of a pose (`ROWS`)."""
 
     def __init__(self, style: Style, first: RowPoses) -> None:
-        """Take the style and the first block; raises ValueInvalid for notations that the format does not have."""
+        """Store the style and the kind of rows; raises ValueInvalid for other notations than the format's."""
         super().__init__(style, first)
         if any(each.spec != "quaternion" for each in style.notations):
             raise ValueInvalid(f"{style.format} writes rotations in its own way; leave --to out")
@@ -139,7 +139,7 @@ class TextWriter(SingleWriter):
         self.made_up |= dict.fromkeys(filter(None, [self.fixed.constants]))
 
     def end(self) -> Iterator[bytes]:
-        """Yield what comes behind the last pose, and warn."""
+        """Yield the text after the last pose, and warn."""
         axes = FORMATS[self.style.format].rows.axes
         if self.count and is_turned(self.style):
             self.made_up[f"camera axes turned from {self.style.axes} to {axes}, half a turn about x"] = None
@@ -149,7 +149,7 @@ class TextWriter(SingleWriter):
         yield self.fixed.tail if self.count else self.fixed.head + self.fixed.tail
 
     def of_block(self, block: RowPoses) -> bytes:
-        """Return the text of a block of poses; numbers are metres and x y z w."""
+        """Return the text of a block; its numbers are metres and quaternions x y z w."""
         if not len(block.numbers):
             return b""
         if (place := self.style.place) is not None:
@@ -162,7 +162,7 @@ class TextWriter(SingleWriter):
         left = any(block.parents) or any(block.names), counted and has_stamps and NUMBER not in block.extras
         self.dropped |= {words: None for words, is_left in zip(LOSABLE, left, strict=True) if is_left}
         self.dropped |= dict.fromkeys(name for name in (*self.extras, *block.extras) if name not in (IMAGE, NUMBER))
-        if before and not counted and has_stamps == (NUMBERED in self.made_up):  # those of another block
+        if before and not counted and has_stamps == (NUMBERED in self.made_up):  # unlike the blocks before
             raise ValueInvalid(SOME_STAMPS)
         if not (counted or has_stamps):
             self.made_up[NUMBERED] = None
@@ -172,7 +172,7 @@ class TextWriter(SingleWriter):
         pose = turned(self.style, (tx, ty, tz, *quaternion.unit(x, y, z, w, arrays)))
         tx, ty, tz, x, y, z, w = rigid.inverse(*pose) if FORMATS[self.style.format].rows.inverse else pose
         turn = (x, y, z, w) if self.style.keep_sign else quaternion.from_quaternion(x, y, z, w, arrays)
-        values = np.column_stack(fmt.numbers(tx, ty, tz, *turn)) + 0.0  # none is -0.0
+        values = np.column_stack(fmt.numbers(tx, ty, tz, *turn)) + 0.0  # no -0.0
         refuse_infinite(values)
         stamps, numbers = block.stamps_ns, [*range(before + fmt.first, before + fmt.first + size)]
         times = [at * BILLION for at in range(before, before + size)] if stamps is None else stamps.tolist()
@@ -204,21 +204,21 @@ class TextWriter(SingleWriter):
 
 
 class RowsWriter(PoseWriter):
-    """Write blocks of poses, points or vectors as CSV, JSON or YAML; rows that are alike are written together."""
+    """Write blocks of poses, points or vectors as CSV, JSON or YAML; rows with the same layout are written together."""
 
     def __init__(self, style: Style, first: RowPoses) -> None:
-        """Take the style and the first block."""
+        """Store the style and the first block."""
         super().__init__(style, first)
         self.documents = None if style.format == "csv" else Documents(style)
-        self.names: dict[str, None] = {}  # of the columns of a table: those of the first rows
-        self.head = first  # which has the columns of a table without rows
+        self.names: dict[str, None] = {}  # columns of a table: those of the first rows
+        self.head = first  # determines the columns of a table without rows
 
     def of_block(self, block: RowPoses) -> bytes:
-        """Return the text of a block of poses; numbers are metres and x y z w."""
+        """Return the text of a block; its numbers are metres and quaternions x y z w."""
         if not len(block.numbers):
             return b""
         self.settle(block)
-        # rows without a result are written one by one, and those whose angles are not unique
+        # rows without a result, or with angles that are not unique, are written one by one
         alone, alike = np.isnan(block.numbers[:, 0]), list[AlikeRows]()
         with np.errstate(invalid="ignore"):
             if (locked := self.target.locked(self.columns(block)[:7])) is not None:
@@ -231,7 +231,7 @@ class RowsWriter(PoseWriter):
         if len(rows):
             some = kept(block, rows) if len(singles) else block
             numbers = self.target.written(some.unmoved(self.columns(some)), arrays)
-            values = np.stack(np.broadcast_arrays(*numbers), axis=-1) + 0.0  # none is -0.0
+            values = np.stack(np.broadcast_arrays(*numbers), axis=-1) + 0.0  # no -0.0
             refuse_infinite(values)
             scalars = {leaf_mark(at): cells for at, cells in enumerate(some.extras.values())}
             alike = [AlikeRows(self._marked(some), rows, values, some._replace(extras=scalars))]
@@ -247,14 +247,14 @@ class RowsWriter(PoseWriter):
         return text if before else row(self.names, self.style).encode() + text
 
     def end(self) -> Iterator[bytes]:
-        """Yield the names of the columns if there were no rows."""
+        """Yield the header of a table without rows."""
         if self.documents is None and not self.names:
             yield row(cells_of(self._marked(self.head).value, self.style), self.style).encode()
 
     def _marked(self, block: RowPoses) -> Marked:
-        """Make a result with what this block's have; what differs from row to row is marked."""
+        """Return a result like those of a block, with marks for everything that differs from row to row."""
         size, place = {POSE: 7, **dict.fromkeys(SIX, 6)}.get(self.kind, 3), self.target.place
-        # nothing near the Earth's centre has a latitude
+        # far from the Earth's centre, where no latitude is defined
         own = (*((1.0 if place is None else 1e6) * part for part in NUMBERS[:3]), *NUMBERS[3:size])
         more = [MORE_NUMBERS + at for at in range(len(self.extras))]
         numbers = [*self.target.written(own, floats), *more]
@@ -278,27 +278,27 @@ def refuse_infinite(values: Floats) -> None:
 
 
 def refuse_scale_in(fmt: str, extra: Iterable[str]) -> None:
-    """Stop where a format has no place for the scale of a similarity, which would then be a pose."""
+    """Raise ValueInvalid if a format has no place for the scale of a similarity."""
     if SCALE in extra and fmt not in ("text", *LEARNED):
         raise ValueInvalid(f"{fmt} has no place for a scale; write json, yaml or csv")
 
 
-# --- rows that are written alike: as lines of CSV or JSON, as documents of YAML, as values, and as poses ---
+# --- rows with the same layout: as lines of CSV or JSON, as documents of YAML, as values, and as poses ---
 
-# marks: of numbers (those of a pose; more of them are 0.7310585786300049 + n), stamps, names, and scalars
+# marks of numbers (of a pose; further ones are 0.7310585786300049 + n), stamps, names, and scalars
 NUMBERS = (0.1370842961, -3.7208412957, 29.6518402397, 0.22360679774997896, -0.37416573867739417, 0.5099019513592785,
            0.7416198487095663)  # fmt: skip
 MORE_NUMBERS = 0.7310585786300049
 STAMP_NS = 1234567890987654321
 PARENT, NAME = "@@parent@@", "@@name@@"
-# columns that are written as they are, or within quotes
+# columns whose texts are written unchanged, or between quotes
 VALUES = re.compile(rb"(?:(?:%s|true|false)\n)*+" % JSON_NUMBER.encode())
 WORDS = re.compile(rb'(?:(?!(?:true|false)\n)[A-Za-z_][^"\\\x00-\x1f\x7f-\xff]*+(?<! )\n)*+')
 LEAF = re.compile(r"73105857(\d{7})")  # a whole number: in JSON it needs no quotes either
 
 
 class Syntax(NamedTuple):
-    """How scalars are written in a place: quotes around texts, what a text must not hold to pass, and any value."""
+    """The syntax of scalars in a place: quotes around texts, bytes that need escapes, a writer for any value."""
 
     quote: str
     unsafe: bytes
@@ -312,11 +312,12 @@ YAML = Syntax('"', bytes(range(128)), lambda value: quoted_in_yaml(value) if typ
 
 
 class Marked(NamedTuple):
-    """The result of one of many rows that are alike, with marks in the place of what differs.
+    """One result that represents many with the same layout, with marks for everything that differs.
 
-    value: the result; numbers: which column of results stands for a number of it, by its text; size: the columns
-    stamp: of records, the stretches of their stamp; in_ns: the nanoseconds per unit of a single one
-    quotes: of records, those around the scalars, by their marks; is_json: in JSON a scalar without quotes is no text
+    value: the result; numbers: the column of results for each mark of a number; size: the number of columns
+    stamp: the stretches of the stamp of records; in_ns: nanoseconds per unit of a single one
+    quotes: the quotes around the scalars of records, by mark; None for rows of tables
+    is_json: the records are JSON, in which a scalar without quotes is not a text
     """
 
     value: Value
@@ -334,10 +335,10 @@ def leaf_mark(number: int) -> str:
 
 
 class AlikeRows(NamedTuple):
-    """Results that are written alike, one a row.
+    """Results with the same layout, one per row.
 
-    places: (n,) where each is; numbers: (n, k) those that are written
-    block: the poses, with their frames, their stamps, and the scalars by their marks; those of records without quotes
+    places: (n,) the position of each; numbers: (n, k) the numbers to write
+    block: the poses with their frames and stamps; its extras are the other scalars by mark, of records without quotes
     """
 
     marked: Marked
@@ -350,11 +351,11 @@ class AlikeRows(NamedTuple):
         return AlikeRows(self.marked, self.places[rows], self.numbers[rows], kept(self.block, rows))
 
     def as_documents(self, text: str, style: Style) -> list[Spans]:
-        """Return the rows as JSON or YAML; text: that of the result with marks."""
+        """Return the rows as JSON or YAML; text: the result with marks."""
         return self._text([(text, YAML if style.format == "yaml" else JSON)], style)
 
     def as_cells(self, cells: Mapping[str, Any], columns: Iterable[str], style: Style) -> list[Spans]:
-        """Return the rows as lines of CSV; cells: those of the result with marks."""
+        """Return the rows as lines of CSV; cells: the result with marks."""
         parts: list[tuple[str, Syntax]] = []
         exact = style.changed(precision=None, screen=False)
         for at, name in enumerate(columns):
@@ -363,7 +364,7 @@ class AlikeRows(NamedTuple):
         return self._text([*parts, ("\n", CELL)], style)
 
     def _text(self, parts: Sequence[tuple[str, Syntax]], style: Style) -> list[Spans]:
-        """Return the rows as text; parts: the text of the result with marks, and how scalars are written in it."""
+        """Return the rows as text; parts: pieces of the result with marks, each with the syntax of its scalars."""
         columns, size = self.marked.numbers, len(self.places)
         marks = rf"(?<![\w.+-])(?:{'|'.join([*map(re.escape, columns), str(STAMP_NS)])})(?![\w.+-])"
         pieces, spans, waiting = list[Piece](), list[Spans](), ""
@@ -376,7 +377,7 @@ class AlikeRows(NamedTuple):
                     made: Piece = Out(columns[mark], columns[mark] + 1)
                 elif mark in (PARENT, NAME, str(STAMP_NS)) or LEAF.fullmatch(mark):
                     scalar, around = self._scalar(mark, syntax)
-                    if (only := one_text(scalar)) is not None:  # what is the same in all rows costs nothing
+                    if (only := one_text(scalar)) is not None:  # the same in all rows: constant text
                         waiting += f"{around}{only.decode()}{around}"
                         continue
                     made, spans = In(len(spans)), [*spans, scalar]
@@ -391,7 +392,7 @@ class AlikeRows(NamedTuple):
         return assemble(pieces, spans, self.numbers, locked, style.precision, yaml=style.format == "yaml")
 
     def _scalar(self, mark: str, syntax: Syntax) -> tuple[Spans, str]:
-        """Return what is in the place of a mark, as it is written there, and the quotes around it."""
+        """Return the texts that replace a mark, and the quotes around them."""
         block, quotes, is_cell = self.block, self.marked.quotes, syntax is CELL
         if mark in (PARENT, NAME):
             return self._words(block.parents if mark == PARENT else block.names, syntax), ""
@@ -423,13 +424,13 @@ class AlikeRows(NamedTuple):
         return self._words(self._column(mark), syntax), ""
 
     def _words(self, values: Sequence[Any], syntax: Syntax) -> Spans:
-        """Return plain values as they are written in a place, one a row or one for all."""
+        """Return plain values in the syntax of a place, one per row or one for all."""
         known = {value: syntax.write(value).encode() for value in dict.fromkeys(values)}
         size = len(self.places)
         return spans_of([known[value] for value in values]) if len(values) == size else constant(known[values[0]], size)
 
     def _column(self, mark: str) -> list[Any]:
-        """Return a scalar of each row as a plain value."""
+        """Return the values that a mark represents, one per row."""
         cells, quotes = self.block.extras[mark], self.marked.quotes
         if quotes is None or not isinstance(cells, Spans):
             return plain_cells(cells)
@@ -442,7 +443,7 @@ class AlikeRows(NamedTuple):
         return [known[text] for text in texts]
 
     def _said(self, part: Any) -> list[Any]:
-        """Return what each row says where the result of all has a part, whose marks are scalars of rows."""
+        """Return a part of the result for each row, with the row's values for its marks."""
         block, size = self.block, len(self.places)
         if type(part) in (dict, list):
             columns = [self._said(each) for each in (part.values() if type(part) is dict else part)]
@@ -457,7 +458,7 @@ class AlikeRows(NamedTuple):
         return self._column(part) if isinstance(part, str) and LEAF.fullmatch(part) else [part] * size
 
     def values(self) -> Iterator[Value]:
-        """Yield the rows as single results; the numbers of poses are position and quaternion."""
+        """Yield the rows as single results; the numbers of poses must be position and quaternion."""
         value = self.marked.value
         if not isinstance(value, Result):
             yield from self._said(value)
@@ -473,7 +474,7 @@ class AlikeRows(NamedTuple):
             yield Result(own, extras)
 
     def poses(self) -> RowPoses | None:
-        """Return the rows as poses, with places for lines; None where they are points, on the Earth, or scaled."""
+        """Return the rows as a block with positions for lines; None if they are not plain poses."""
         value = self.marked.value
         if not isinstance(value, Result) or None in (value.pose.position, value.pose.rotation):
             return None

@@ -1,4 +1,4 @@
-"""Results in another format, block by block: what is alike becomes rows together, all else a result at a time."""
+"""Write results of records in another format, block by block: those with the same layout as rows, others one by one."""
 
 from __future__ import annotations
 
@@ -27,18 +27,22 @@ TOGETHER = 1 << 13  # results that are written as one block
 
 
 class BlockResults(NamedTuple):
-    """What the records of a block became: those that are alike together, and single results, by place in its text."""
+    """The results of the records of a block.
+
+    batches: results with the same layout, together; values: single results, each with its position in the text
+    text: the text of the block
+    """
 
     batches: Sequence[AlikeRows]
     values: list[tuple[int, Value]]
     text: bytes = b""
 
     def posed(self) -> RowPoses | None:
-        """Return the rows as one block of poses; None where they are more, or others."""
+        """Return the results as one block of poses; None if they are not one batch of poses."""
         return None if self.values or len(self.batches) != 1 else self.batches[0].poses()
 
     def placed(self) -> list[tuple[int, Value]]:
-        """Return all results as values, each with its place, in the order of their records."""
+        """Return all results as values, each with its position, in the order of their records."""
         rows = (zip(batch.places.tolist(), batch.values(), strict=True) for batch in self.batches)
         return sorted(chain(self.values, *rows), key=itemgetter(0))
 
@@ -48,7 +52,7 @@ class BlockResults(NamedTuple):
 
 
 def blocks_of(values: Iterable[Value]) -> Iterator[BlockResults]:
-    """Yield single results as blocks."""
+    """Yield single results in blocks of TOGETHER."""
     rest = enumerate(values)
     return (BlockResults((), each) for each in iter(lambda: [*islice(rest, TOGETHER)], []))
 
@@ -57,7 +61,7 @@ LINE = re.compile(rb'((?:[^"\n]|"[^"]*")*+)\n')
 
 
 def text_in_order(lines: Sequence[tuple[int, bytes]], groups: Sequence[tuple[Ints, list[Spans]]]) -> bytes:
-    """Return lines of single results and groups of rows in the order of their places."""
+    """Return the text of single results and of groups of rows, in the order of their positions."""
     if not groups:
         return b"".join(map(itemgetter(1), lines))
     from frametool.rows.batch import texts_as_rows, written
@@ -66,13 +70,13 @@ def text_in_order(lines: Sequence[tuple[int, bytes]], groups: Sequence[tuple[Int
 
 
 class ResultWriter(Protocol):
-    """Writes the results of blocks: some text at once, the rest at the end."""
+    """A writer of the results of blocks; part of the text may be held back until the end."""
 
     def of_block(self, block: Any) -> bytes:
-        """Return what is written of a block at once."""
+        """Add a block; return the text that can be written now."""
 
     def end(self) -> Iterable[bytes]:
-        """Yield what comes behind the last block."""
+        """Yield the rest of the text."""
         return ()
 
 
@@ -80,7 +84,7 @@ class Documents(ResultWriter):
     """Write results as lines of JSON or as documents of YAML."""
 
     def __init__(self, style: Style) -> None:
-        """Begin without any."""
+        """Begin without results."""
         self.style, self.exact = style, style.changed(precision=None, screen=False)
         self.parting = "---\n" if style.format == "yaml" else ""
         self.begun = False
@@ -98,7 +102,7 @@ class Documents(ResultWriter):
 
 
 def csv_rows(block: BlockResults, columns: dict[str, None], style: Style) -> bytes:
-    """Return the rows of a block in a table, and add its columns to those that the table has."""
+    """Return the rows of a block as a table; its new columns are added to `columns`."""
     rows: list[tuple[int, dict[str, Any], AlikeRows | None]] = [
         (place, cells_of(value, style), None) for place, value in block.values
     ]
@@ -116,35 +120,35 @@ def csv_rows(block: BlockResults, columns: dict[str, None], style: Style) -> byt
 
 
 class CsvTable(ResultWriter):
-    """Put results together as one table, which is written at the end, when its columns are known."""
+    """Collect results into one table, which is written at the end, when all columns are known."""
 
     def __init__(self, style: Style) -> None:
         """Begin without columns."""
         self.style = style
         self.columns: dict[str, None] = {}
-        self.sizes: list[tuple[int, int]] = []  # of each block the columns that it has, and its bytes
+        self.sizes: list[tuple[int, int]] = []  # for each block the number of columns and of bytes
 
     def end(self) -> Iterator[bytes]:
         """Yield the table of all blocks."""
         if not self.columns:
             return
         yield row(self.columns, self.style).encode()
-        with self.waiting:  # there are rows where there are columns
+        with self.waiting:  # with columns there are rows, too
             self.waiting.seek(0)
             for count, size in self.sizes:
                 text = self.waiting.read(size)
-                missing = len(self.columns) - max(count, 1)  # a row without cells is a line all the same
+                missing = len(self.columns) - max(count, 1)  # a row without cells is a line, too
                 yield LINE.sub(rb"\1" + b"," * missing + b"\n", text) if missing else text
 
     @cached_property
     def waiting(self) -> SpooledTemporaryFile[bytes]:
-        """Return where rows wait; closed with the table."""
+        """Return the temporary file that collects the rows."""
         from tempfile import SpooledTemporaryFile
 
         return SpooledTemporaryFile(sizes.TABLE)
 
     def of_block(self, block: BlockResults) -> bytes:
-        """Add the rows of a block; nothing is written yet."""
+        """Add the rows of a block; returns no text."""
         text = csv_rows(block, self.columns, self.style)
         if text:
             self.waiting.write(text)
