@@ -1,4 +1,4 @@
-"""A stream from end to end: outcomes in order, bad rows reported behind the good ones before them, the exit status."""
+"""Run a stream: outcomes in order, bad rows reported after the good ones before them, and the exit status."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ DONE, ROWS_SKIPPED = 0, 3
 
 
 class Fault(NamedTuple):
-    """One bad row.
+    """A bad row.
 
-    line: counted as whoever keeps it says
-    column: the name or number of the column that is to blame, "" for the whole row
-    reason: why it is bad, an error or its message
-    final: nothing behind it can be read
-    kind: the name of the failure in machine output, where the reason does not say it
-    skipped: the row is left out whatever the rule
+    line: of the row, from the start that the caller counts from
+    column: the name or number of the bad column; "" for the whole row
+    reason: why it is bad, as an error or a message
+    final: nothing after it can be read
+    kind: the name of the failure in machine output, if the reason has none
+    skipped: the row is skipped whatever `on_error` is
     """
 
     line: int
@@ -38,11 +38,11 @@ class Fault(NamedTuple):
 
 
 DEGREES = "degrees"
-ZONES = "zone"  # of UTM, of a row; `run` tells where it is first another than before
+ZONES = "zone"  # the UTM zone of a row; `run` warns when it changes
 
 
 class RowNote(NamedTuple):
-    """Something worth telling about a row: its line from 0, what it is about, the sentence, and the column."""
+    """A warning about a row: its line from 0, the rule, the message, and the column."""
 
     line: int
     about: str
@@ -50,25 +50,25 @@ class RowNote(NamedTuple):
     column: str = ""
 
     def place(self) -> tuple[int, str, int, str]:
-        """Return what notes are sorted by: line, kind, column; records may share a line."""
+        """Return the key that notes are sorted by: line, rule, column; records may share a line."""
         return self.line, self.about, len(self.column), self.column
 
     @classmethod
     def of_lost_name(cls, line: int, name: str) -> RowNote:
-        """Warn that a frame is not named any more."""
+        """Return the warning that the result no longer names a frame."""
         return cls(line, "unnamed", f"frame {shown(name)} is left out: the frames of the result are not known")
 
 
 class BadRow(FormatError):
-    """Report a bad row; if it ended the run, the rows before it are out.
+    """The report of a bad row; if it ends the run, the rows before it are already written.
 
-    fate: what became of it: `row skipped`, `no result`, or "" if the run ended
-    counted: what the number of its place counts: `line`, or `row` where there are no lines
-    remedy: what to do, in text for people
+    fate: `row skipped`, `no result`, or "" if it ends the run
+    counted: the unit of its number: `line`, or `row` or `message` in files without lines
+    remedy: what to do, in text output
     """
 
     def __init__(self, fault: Fault, reason: str, *, source: str, fate: str = "", counted: str = "line") -> None:
-        """Take place and kind of a fault; `reason` is its long or its short one."""
+        """Store the place and the kind of a fault; `reason` is its long or its short message."""
         super().__init__(f"{reason} ({fate})" if fate else reason, source=source, line=fault.line)
         self.fault = fault
         self.counted = counted
@@ -86,7 +86,7 @@ class BadRow(FormatError):
         return self.fault.kind or getattr(self.fault.reason, "kind", "bad_row")
 
     def details(self) -> dict[str, object]:
-        """Return the place, whose column has a name or a number."""
+        """Return the place, with the column as a name or a number."""
         column = self.fault.column
         place = super().details()
         if self.counted != "line":
@@ -95,33 +95,33 @@ class BadRow(FormatError):
 
 
 def _place(source: str, counted: str, number: int, column: str) -> str:
-    """Name a line, or a row or message of a source, and a column in it."""
+    """Return the place of a line, row or message of a source, and of a column in it."""
     if counted == "line":
         return f"{source}:{number}" + f":{column}" * bool(column)
     return f"{source}: {counted} {number}" + f", column {column}" * bool(column)
 
 
 class RowsSkipped(FrametoolError):
-    """Report how many rows of a run have no result."""
+    """The report of how many rows of a run have no result."""
 
     exit_code = ROWS_SKIPPED
 
 
 class BadRows:
-    """Report bad rows as they come, count them, and say how the run ends.
+    """Report bad rows as they come, count them, and determine how the run ends.
 
-    source: as messages name it
+    source: its name in messages
     on_error: STOP, SKIP or NULL
-    most: how many are reported
-    tell: what reports them
-    counted: what their numbers count: lines, or rows
+    most: the number of rows to report
+    tell: function that reports an error
+    counted: the unit of rows: `line`, `row` or `message`
     """
 
     def __init__(
         self, source: str, on_error: str = STOP, *, most: int = MOST, counted: str = "line",
         tell: Callable[[FrametoolError], None] = lambda error: warn(str(error)),
     ) -> None:  # fmt: skip
-        """Create an empty count."""
+        """Start with no bad rows."""
         self.source = source
         self.on_error = on_error
         self.most = most
@@ -129,10 +129,10 @@ class BadRows:
         self.counted = counted
         self.unit = "message" if counted == "message" else "row"
         self.count = 0
-        self._has_listed = False  # the list of known names is in the first message only
+        self._has_listed = False  # only the first message lists the known names
 
     def take(self, faults: Iterable[Fault]) -> None:
-        """Report the faults of a block; raise BadRow at the first if that is the rule."""
+        """Report the faults of a block; raise BadRow at the first if `on_error` is STOP, or if nothing follows it."""
         for fault in faults:
             self.count += 1
             if self.on_error == STOP or fault.final:
@@ -142,11 +142,11 @@ class BadRows:
                 self.tell(BadRow(fault, self._reason(fault), source=self.source, fate=fate, counted=self.counted))
 
     def place(self, number: int, column: str = "") -> str:
-        """Name a line or a row, and a column in it."""
+        """Return the place of a line or a row, and of a column in it."""
         return _place(self.source, self.counted, number, column)
 
     def finish(self, rows: int) -> int:
-        """Report the final count of a run of so many rows; return its exit status."""
+        """Report the number of bad rows of a run with `rows` rows; return the exit status."""
         if not self.count:
             return DONE
         verb = "skipped" if self.on_error == SKIP else "without result"
@@ -163,16 +163,16 @@ class BadRows:
 
 
 class Outcome(NamedTuple):
-    """What became of a block.
+    """The result of a block.
 
-    text: what is written
-    faults: the bad rows, by line from 0
-    rows, lines, size: how many rows, lines and bytes the block had
-    mended: how many rotations were off and normalised
-    notes: what is worth telling
-    kept: how many rows are in the text, or the results
-    is_open: whether an array goes on behind the block; None for what is no array
-    results: what is yet to be written
+    text: the output
+    faults: the bad rows, with lines from 0
+    rows, lines, size: the number of rows, lines and bytes of the block
+    mended: the number of rotations that were normalised
+    notes: warnings
+    kept: the number of rows in the text, or in the results
+    is_open: an array continues after the block; None outside of arrays
+    results: results that are not yet written
     """
 
     text: bytes | memoryview
@@ -188,7 +188,7 @@ class Outcome(NamedTuple):
 
 
 def written_by(writer: ResultWriter, outcomes: Iterator[Outcome], on_error: str) -> Generator[Outcome]:
-    """Let a writer write the results of blocks; what it holds back comes before the error that ends a stream."""
+    """Write the results of blocks; text that the writer holds back comes before the error that ends a stream."""
     begun = False
     while True:
         try:
@@ -214,9 +214,9 @@ def run(
     bad: BadRows,
     advance: Callable[[int, int], None] | None = None,
 ) -> int:
-    """Write what becomes of each block, report its faults, and return the exit status.
+    """Write the text of each block, report its faults, and return the exit status.
 
-    advance: receives rows and bytes done after each block.  Raises BadRow at the first fault if that is the rule.
+    advance: called with the rows and bytes of each block.  Raises BadRow at the first fault if `bad.on_error` is STOP.
     """
     line, rows, mended = 1, 0, 0
     reported: set[str] = set()
@@ -242,6 +242,6 @@ def run(
             warn(f"{bad.place(line + note.line, note.column)}: {note.sentence}")
         bad.take(faults)
         line, rows, mended = line + outcome.lines, rows + outcome.rows, mended + outcome.mended
-    if mended > 1:  # the first was reported
+    if mended > 1:  # the first was already reported
         warn(f"{bad.source}: {mended} of {rows} rotations were off by more than 1e-6 and were normalised")
     return bad.finish(rows)

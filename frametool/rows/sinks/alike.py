@@ -72,7 +72,7 @@ class RecordRows:
         """
         template, marked, parts = cut.template, self._plans[cut.template][1], run.block.parts
         left = {*run.rows[run.locked[run.rows] != 0].tolist()} if marked else {*run.rows.tolist()}
-        if self.style.format == "yaml":  # in which the text of null may differ
+        if self.style.format == "yaml":  # a null changes the layout of YAML
             for cells in (parts[at] for at, node in template.leaves if not node.quote):
                 left |= {*np.flatnonzero(cells.data[cells.starts] == ord("n")).tolist()}
         stamps = []

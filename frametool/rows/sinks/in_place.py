@@ -1,7 +1,7 @@
 """Edit records in the text of a stream: replace numbers in place; replace, add or remove members.
 
-All other text is unchanged, byte for byte.  Of the syntax of JSON and YAML this uses only how members are written and
-separated.
+All other text is unchanged, byte for byte.  Of the syntax of JSON and YAML only the spelling of members and their
+separators is used.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ OURS = frozenset((*POINT_KEYS, *ROTATION_KEYS, AXES_KEY, *XYZ, "linear", "angula
 
 
 class Edit(NamedTuple):
-    """A range of the text and its replacement; an empty range is an insertion."""
+    """A range of the text and the pieces that replace it; an empty range is an insertion."""
 
     start: int
     end: int
@@ -53,7 +53,7 @@ class Edit(NamedTuple):
 
 
 def nulls_in(node: Node) -> Iterator[tuple[int, int, str]]:
-    """Yield the ranges of the numbers of poses at any depth of a record, each with the null that replaces it."""
+    """Yield the range of each number of a pose, at any depth of a record, with the null that replaces it."""
     if type(node.value) is list:
         for item in node.value:
             yield from nulls_in(item)
@@ -67,9 +67,10 @@ def nulls_in(node: Node) -> Iterator[tuple[int, int, str]]:
 
 
 class Splicer:
-    """The edits of one record's members; `first` is the index of its first number among all results of the text.
+    """The edits that write a result into the text of its record.
 
-    ahead, behind: members to insert before and behind one, by its key; dropped: keys of members to remove
+    first: the index of the record's first number among all results of the text
+    ahead, behind: members to insert before and after a member, by its key; dropped: keys of members to remove
     """
 
     def __init__(self, root: Node, entry: Entry, request: Request, *, json: bool, first: int) -> None:
@@ -82,13 +83,13 @@ class Splicer:
         self.members: dict[str, tuple[Node, Node]] = self.node.value if type(self.node.value) is dict else {}
         self.flow = json or self.node.flow or not self.members
         self.head, self.tail = next(iter(self.members), ""), next(reversed(self.members), "")
-        self.between = ", " if self.flow else "\n" + " " * self.members[self.head][0].column  # the separator
+        self.between = ", " if self.flow else "\n" + " " * self.members[self.head][0].column  # separator of members
         self.edits, self.dropped = list[Edit](), set[str]()
         self.ahead, self.behind = defaultdict[str, list[Pieces]](list), defaultdict[str, list[Pieces]](list)
         self.slots: list[Node | None] = [None if path is None else root.at(path) for path in record.numbers]
 
     def run(self) -> list[Edit]:
-        """Return the edits, in no order."""
+        """Return the edits, in no particular order."""
         shape, unit = self.record.shape, self.target.unit
         # a bare list remains one if the result has the same numbers
         stays = bool(self.members) or ((unit is None or shape.unit is not None) and not self.target.extras)
@@ -114,7 +115,7 @@ class Splicer:
         gap, members = Const(self.between.encode()), list(self.members.values())
         if not members and (parts := self.behind[""]):
             yield Edit(self.node.start, self.node.end, (Const(b"{"), *_joined(parts, gap), Const(b"}")))
-        follows = False  # whether a member is before it
+        follows = False  # True after the first remaining member
         for at, (key, (key_node, value)) in enumerate(self.members.items()):
             parts = self.behind[key]
             yield from (Edit(key_node.start, key_node.start, (*part, gap)) for part in self.ahead[key])
@@ -136,17 +137,17 @@ class Splicer:
         return same and shape.whole == target.whole and not (shape.inverse or is_alone)
 
     def _numbers(self, slots: Sequence[int], first: int) -> None:
-        """Replace the numbers in some slots by those of the result from `first` on."""
+        """Replace the numbers in some slots by those of the result, from `first` on."""
         for out, slot in enumerate(slots, self.first + first):
             if (node := self.slots[slot]) is not None:
                 quote = bool(node.quote)
                 self.edits.append(Edit(node.start + quote, node.end - quote, (Out(out, out + 1, b""),)))
 
     def _in_place(self) -> None:
-        """Write the numbers of a result in the place of the record's, or as new members."""
+        """Write the result over the record's numbers; numbers without a place of their own become new members."""
         target, shape, keys = self.target, self.record.shape, self.record.keys
         if target.scaled:
-            self.dropped.update(keys.covariances)  # the matrix has the scale
+            self.dropped.update(keys.covariances)  # the matrix contains the scale
         elif not shape.rewritten:
             covariances = range(shape.own_size, shape.own_size + sum(shape.covariance))
             self._numbers(covariances, target.own_size + len(target.extras))
@@ -179,7 +180,7 @@ class Splicer:
                 if at:
                     self.dropped.update({"angles", at, *keys.flat})
                 elif made and target.unit is None:
-                    at = next(iter(members), "")  # where the position was, which is part of it
+                    at = next(iter(members), "")  # in place of the position, which the matrix contains
             at = at or keys.position
         else:
             self.dropped.update(keys.others)
@@ -189,7 +190,7 @@ class Splicer:
         self.behind[at or self.tail] += made + self._extras(target.own_size, () if made else keys.flat)
 
     def _place(self, key: str) -> Pieces:
-        """Write the position as members: x, y, z, or a geodetic one with the axes of its rotation."""
+        """Return the position as members: x, y, z, or a geodetic position with the axes of its rotation."""
         place = self.target.place
         entry: dict[str, Any] = {key: list(SAMPLE[:3])} if place is None else place.entry(place.sample)
         if place is not None and place.name in EARTH_FRAMES:
@@ -199,7 +200,7 @@ class Splicer:
         return self._member(entry, 0)
 
     def _rotation(self) -> list[Pieces]:
-        """Write the rotation in all notations, with the flag for gimbal lock; [] without a rotation."""
+        """Return the rotation as members in all notations, with a flag for gimbal lock; [] without a rotation."""
         notations = self.target.notations
         degrees = any(degrees for notation, degrees in notations if notation.degrees is None)  # of bare angles
         style = Style("json", tuple(notation for notation, _ in notations), degrees=degrees)
@@ -212,9 +213,9 @@ class Splicer:
         return [made] if made else []
 
     def _extras(self, first: int, there: Sequence[str] = ()) -> list[Pieces]:
-        """Return the extra numbers of a result as members; existing ones are replaced if the operation does so.
+        """Return the extra numbers of a result as members; existing ones are replaced if the operation wants it.
 
-        there: keys that are written already, like the angle of an axis-angle
+        there: keys that are already written, such as the angle of an axis-angle
         """
         said, prefix, members = self.request.operation.shown, self.request.results.prefix, list[Pieces]()
         if said is None:
@@ -238,7 +239,7 @@ class Splicer:
         return members
 
     def _listed(self, places: Sequence[int]) -> Iterator[Piece]:
-        """Yield the pieces of a list of numbers, or of a single one; null instead of nan."""
+        """Yield the pieces of a list of numbers, or of a single number; null for nan."""
         precision = self.request.results.precision
         fmt, exponent = "" if precision is None else f"z.{precision}f", "e" if self.json else ".0e"
         opens, closes = ("[", "]") if places[1:] else ("", "")
@@ -261,7 +262,7 @@ class Splicer:
             said["stamp_ns"] = Verbatim(str(record.stamp_ns))
         names = [(record.name, self.entry.name, "name")]
         names += [(record.parent, self.entry.parent, parent)] if record.parent.paths or not record.parent.text else []
-        # in a row that was no pose these keys have another meaning
+        # in a row without a pose these keys have another meaning
         others = not self.request.rows.poses and {"name", "parent"} & self.members.keys() - {*record.keys.members}
         for old, new, key in () if self.request.rename is None or others else names:
             if new == old.text:
@@ -279,7 +280,7 @@ class Splicer:
             self.ahead[self.head].append(self._member(said, 0))
 
     def _member(self, entry: dict[str, Any], first: int) -> Pieces:
-        """Write members in the style of the record; each number is a piece."""
+        """Return members in the style of the record, with a piece for each number."""
         if self.flow or not entry:
             text = (dump_json if self.json else flow)(entry, lambda _: MARK)[1:-1]
         else:
@@ -294,18 +295,18 @@ class Splicer:
 
 
 def _item(before: str, behind: str, none: str, fmt: str, exponent: str, number: float) -> bytes:
-    """Write a number of a list with what is around it, or another text for nan."""
+    """Write a number of a list with the text around it, or `none` for nan."""
     return none.encode() if isnan(number) else f"{before}{number_text(number, fmt, exponent)}{behind}".encode()
 
 
 def number_text(number: float, fmt: str, exponent: str) -> str:
-    """Write a number in a format of Python's; exponent: what 1e-05 has for its e, in YAML `.0e`."""
+    """Write a number with a format specification; exponent: replaces the e of 1e-05, `.0e` for YAML."""
     text = format(number, fmt)
     return text if "." in text else text.replace("e", exponent)
 
 
 def _joined(parts: Sequence[Pieces], gap: Const) -> Pieces:
-    """Return members with separators."""
+    """Return members joined by separators."""
     return tuple(piece for part in parts for piece in (gap, *part))[1:]
 
 
@@ -319,7 +320,7 @@ def quoted_name(node: Node, name: str, *, json: bool) -> str:
 
 
 def rendered(known: RecordText, answers: Sequence[Answer]) -> bytes:
-    """Return the text with results instead of its numbers; b"" if it has no records."""
+    """Return the text with its numbers replaced by results; b"" if it has no records."""
     numbers = [*chain.from_iterable(map(written, answers))]
     precision, exponent = known.request.results.precision, "e" if known.json else ".0e"
     fmt = "" if precision is None else f"z.{precision}f"
@@ -341,7 +342,7 @@ def rendered(known: RecordText, answers: Sequence[Answer]) -> bytes:
 def stretches_of(
     length: int, cuts: Sequence[tuple[int, int]], edits: Iterable[Edit]
 ) -> tuple[list[tuple[int, int]], list[Piece]]:
-    """Split a text into stretches, one for each of `cuts`, and return them with the pieces of the result."""
+    """Split a text at `cuts` and `edits` into stretches; return these and the pieces of the result."""
     stretches: list[tuple[int, int]] = []
     pieces: list[Piece] = []
     slots, at = list(reversed(cuts)), 0
@@ -360,7 +361,7 @@ def stretches_of(
 
 
 def nulled(record: bytes, *, json: bool) -> tuple[str, bool]:
-    """Return a record with null instead of the numbers of its pose, and whether it has any; "" for a broken one."""
+    """Return a record with null for the numbers of its pose, and True if it has any; "" for one that is not valid."""
     try:
         text = record.decode()
         json_documents(Source("", text)) if json else parse_documents(text, "")

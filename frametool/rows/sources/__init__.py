@@ -1,1 +1,1 @@
-"""What rows and records come from: tables, texts of records, files of columns; read block by block."""
+"""Sources of rows and records, read block by block: tables, texts of records, files of columns."""

@@ -1,6 +1,6 @@
-"""Stream files of columns of numbers: they are planned like tables and evaluated in the same blocks, without text.
+"""Stream binary files of columns: planned like tables, computed in the same blocks, written without text.
 
-The points of a message are such a file too: moved by one pose, and written as a file of their own.
+A point cloud in a message is such a file, too: it is moved by one pose and written as a file of its own.
 """
 
 from __future__ import annotations
@@ -43,16 +43,16 @@ if TYPE_CHECKING:
     from frametool.text.spans import Flags, Floats
 
 
-PARENT, NAME, STAMP = "parent", "name", "stamp_ns"  # columns of listed poses
+PARENT, NAME, STAMP = "parent", "name", "stamp_ns"  # columns of `ListedPoses`
 
 
 class ListedPoses(ColumnFile):
-    """The poses of a file that lists them, as columns; an edge of a pose graph names its frames."""
+    """The poses of a file that lists them, as columns; an edge of a pose graph has columns for its two frames."""
 
     gaps = False
 
     def __init__(self, file: InputFile, options: Options, request: Request, *, numbered: bool) -> None:
-        """Read the first poses; numbered: their numbers are another column.
+        """Read the first block of poses; numbered: add a column with their numbers.
 
         Raises FormatError if there are none.
         """
@@ -89,7 +89,7 @@ class ColumnRows(PlannedRows):
     """The rows of a file of columns, batch by batch."""
 
     def __init__(self, file: ColumnFile, request: Request, source: str) -> None:
-        """Plan the rows; raises FormatError or Misused as for a table of the same columns."""
+        """Plan the rows; raises FormatError or Misused as for a table with the same columns."""
         self.file = file
         names = file.names
         header = tuple(quoted(name).encode() for name in names or ())
@@ -98,21 +98,21 @@ class ColumnRows(PlannedRows):
         try:  # `t` or `time` of a cloud is what its sensor counts, in whatever unit; what we write there says it
             super().__init__(table._replace(stamped=is_stamped or not file.vectors), request)
         except FormatError as error:
-            error.line = 0  # the names of columns are in no line here
+            error.line = 0  # binary files have no line with names
             raise
         for at, place in enumerate(self.layout.places):
             if file.kinds[place] is None and at not in self.plan.categorical:
                 raise Misused(f"column {table.name(place)} holds no numbers", source=source)
-        self.narrow: dict[int, Kind] = {}  # numbers that are rounded to fewer digits than they are computed with
-        for column in () if request.results.all_numbers else self.layout.columns:  # all of them are written as doubles
+        self.narrow: dict[int, Kind] = {}  # results that are rounded to a smaller type
+        for column in () if request.results.all_numbers else self.layout.columns:  # which are all doubles
             if isinstance(column, New) and isinstance(column.piece, Out):
                 kind = self._kind_of(column.name)
                 self.narrow |= {column.piece.first: kind} if kind.itemsize < DOUBLE.itemsize else {}
 
     def out_columns(self, *, named: bool = False) -> list[OutColumn]:
-        """Return the columns of the output; what is read as float32 is written so, what is new is a double.
+        """Return the columns of the output; a replaced float32 column remains float32, new columns are doubles.
 
-        named: those of a file without names get the usual ones
+        named: name the columns of a file without names
         """
         names = self.table.names
         usual = [name for each in self.plan.targets for name in (*each.position_columns, *each.names)]
@@ -131,7 +131,7 @@ class ColumnRows(PlannedRows):
         return found
 
     def _kind_of(self, name: str) -> Kind:
-        """Return the type of a result's numbers: that of the column it replaces; raises Misused for integers."""
+        """Return the type of a column of results: that of the column it replaces; raises Misused for integers."""
         names, kinds = self.table.names, self.file.kinds
         kind: Kind | None = DOUBLE
         if names is None and getattr(kinds[0], "kind", "") in FLOATS:  # an array of one type
@@ -144,18 +144,18 @@ class ColumnRows(PlannedRows):
         return kind
 
     def steps(self) -> Iterator[tuple[RowPoses, Outcome]]:
-        """Yield the results of each batch for another format; first those of one without rows."""
+        """Yield the results of each batch for another format, after an empty batch with the columns."""
         for batch in chain([self.file.nothing()], self.file.batches()):
             run, outcome = self.of_batch(batch)
             yield self.poses_of(run, batch.column, batch.lines), outcome
 
     def of_batch(self, batch: Batch) -> tuple[Run, Outcome]:
-        """Return what becomes of a batch, its numbers nan where they are absent, and its outcome."""
+        """Compute a batch; its results are nan where its numbers are absent."""
         values, absent, bad = self._read(batch)
         every = self.request.operation.formula is not None
         shapes = zip(absent, self.plan.shapes, strict=False)
         empty = [flags for flags, shape in shapes if shape.notation or every]
-        gone = np.flatnonzero(np.logical_or.reduce(empty)) if np.any(empty) else None  # 0 is a point, but no rotation
+        gone = np.flatnonzero(np.logical_or.reduce(empty)) if np.any(empty) else None  # 0 is no rotation
         names = self.names_of(batch.size, lambda place: coded_texts(batch.texts(place)))
         stamps, late = self._stamps(batch)
         block = Block(
@@ -164,7 +164,7 @@ class ColumnRows(PlannedRows):
         )  # fmt: skip
         run = self.ran(block)
         for number, kind in self.narrow.items():
-            with np.errstate(over="ignore"):  # bad rows, no infinities
+            with np.errstate(over="ignore"):  # overflow makes a row bad, not infinite
                 run.refuse(~np.isfinite(run.results[:, number].astype(kind)), f"the result is too large for {kind}")
         first, targets = 0, self.plan.targets
         for flags, target in zip(absent, targets, strict=False):
@@ -173,11 +173,14 @@ class ColumnRows(PlannedRows):
             first += target.own_size
         unread = [Fault(max(error.line, 1) - 1, "", error.message) for error in batch.errors]
         faults, size = sorted(unread + run.faults()), batch.size + len(unread)
-        lines = 0 if isinstance(self.file, ListedPoses) else batch.size  # which has its own
+        lines = 0 if isinstance(self.file, ListedPoses) else batch.size  # they have lines of their own
         return run, Outcome(b"", faults, size, lines, len(run.mended), run.notes, batch.bytes_read)
 
     def _read(self, batch: Batch) -> tuple[Floats, Flags, dict[int, tuple[str, str]]]:
-        """Return our numbers (n, c); for each shape which rows have none, which count as 0; and rows that are bad."""
+        """Return the numbers (n, c), for each shape the mask of rows without numbers, and the reasons of bad rows.
+
+        Absent numbers are 0, or nan for a formula.
+        """
         places, shapes = self.layout.places, self.plan.shapes
         columns = np.empty((len(places), batch.size))
         absent = np.zeros((max(len(shapes), 1), batch.size), np.bool_)
@@ -202,7 +205,7 @@ class ColumnRows(PlannedRows):
         return columns.T, absent, bad
 
     def _stamps(self, batch: Batch) -> tuple[list[Any], dict[int, tuple[str, str]]]:
-        """Read the stamps of rows, and which of them have none."""
+        """Read the stamps of rows; also return the column and the reason for each row without a valid stamp."""
         times = self.layout.times
         if not times:
             return [], {}
@@ -214,7 +217,7 @@ class ColumnRows(PlannedRows):
         return [stamps + self.request.offset_ns], {row: (name, reason) for row, reason in reasons.items()}
 
     def made(self, columns: Sequence[OutColumn], run: Run) -> list[Made]:
-        """Return what is in the columns that are made, in their order."""
+        """Return the data of the columns that are new or renamed, in the order of the output."""
         made, (rows, numbers) = list[Made](), run.settled(run.end)
         for column, target in zip(columns, self.layout.columns, strict=True):
             new = target.piece if isinstance(target, New) else None
@@ -234,7 +237,7 @@ class ColumnRows(PlannedRows):
 
 
 def run_columns(file: ColumnFile, request: Request, style: Style, *, source: str) -> Generator[Outcome]:
-    """Yield what becomes of a file's batches in a file of the same format."""
+    """Yield the outcome of each batch of a file, written in the same format."""
     rows = ColumnRows(file, request, source)
     columns = rows.out_columns()
     move_along(file, request)
@@ -249,15 +252,15 @@ def run_columns(file: ColumnFile, request: Request, style: Style, *, source: str
 
 
 class OtherColumns:
-    """Files of columns, each moved by its own pose, as one file of a format: the columns that all of them have.
+    """Write several files of columns, each moved by its own pose, as one file with the columns that all of them have.
 
-    Numbers of one column get the type that holds those of all files.
+    The type of a column can hold the numbers of all files.
     """
 
     def __init__(
         self, files: Sequence[tuple[ColumnFile, Request, str]], style: Style, module: Any = None
     ) -> None:  # fmt: skip
-        """Plan the rows of files, each with what is done with it and its name; raises as `ColumnRows`.
+        """Plan the rows of files, each with its request and its name; raises as `ColumnRows`.
 
         module: as for `ColumnsWriter`
         """
@@ -276,10 +279,10 @@ class OtherColumns:
             move_along(file, request)
 
     def outcomes(self, at: int = 0) -> Generator[Outcome]:
-        """Yield what becomes of the batches of one file, and of the last one what comes behind them."""
+        """Yield the outcome of each batch of one file, and of the last file also the end of the output."""
         file, rows = self.parts[at]
         columns = rows.out_columns(named=True)
-        for batch in chain([file.nothing()], file.batches()):  # which names the columns even where there are no rows
+        for batch in chain([file.nothing()], file.batches()):  # an empty batch has the columns, too
             run, outcome = rows.of_batch(batch)
             (chosen, _), new, found = run.settled(run.end), iter(rows.made(columns, run)), dict[str, Made]()
             for column in columns:
@@ -292,7 +295,7 @@ class OtherColumns:
                     each = Made(values.astype(column.kind)[chosen], None if nulls is None else nulls[chosen])
                 else:
                     each = Made(taken(batch.column(place), chosen))
-                if kind is not None and is_typed(each.values):  # whole numbers with gaps are objects
+                if kind is not None and is_typed(each.values):  # integers with nulls are objects
                     each = each._replace(values=each.values.astype(kind, copy=False))
                 found |= {column.name: each} if column.name in self.kinds else {}
             yield outcome._replace(text=self.writer.of_columns(len(chosen), found))
@@ -301,7 +304,7 @@ class OtherColumns:
 
 
 def move_along(file: ColumnFile, request: Request) -> None:
-    """Let what else has a place among the points of a file move with them."""
+    """Let the file move its other positions, such as that of the sensor, together with its points."""
     operation, timed = request.operation, request.timed
     if operation.moves and not request.results.keep:
         by_row = request.rows.frames or (timed is not None and timed.name)
@@ -309,9 +312,9 @@ def move_along(file: ColumnFile, request: Request) -> None:
 
 
 def moved_cloud(cloud: PointCloud, pose: Rigid, style: Style, source: str) -> Generator[Outcome]:
-    """Return what a cloud becomes when a pose moves it, in the format of a style."""
+    """Yield the outcomes of a point cloud that is moved by a pose and written in the format of a style."""
     module: Any = import_module(FORMATS[style.format].writer)
-    kept = {"grid": (cloud.width, cloud.height), "sensor": pose} if module is pcd else {}  # it has room for them
+    kept = {"grid": (cloud.width, cloud.height), "sensor": pose} if module is pcd else {}  # PCD can store both
     create = lambda columns, _count, style: module.create(columns, len(cloud.rows), style, **kept)  # noqa: E731
     into = SimpleNamespace(**{**vars(module), "create": create})
     request = Request(Operation(left=pose, moves=True))

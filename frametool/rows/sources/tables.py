@@ -1,10 +1,10 @@
-"""Tables as streams: CSV and TSV with a header, and columns between blanks; every byte that is not ours passes.
+"""Tables as streams: CSV and TSV with a header, or columns separated by blanks; other bytes are unchanged.
 
 id,x,y,z,tag                            1305031102.1758 1.34 0.62 1.65 0.657 0.612 -0.295 -0.311
 007,1.0,2.0,3.0,"a,b"                   (TUM: t x y z qx qy qz qw; s, m; the pose of the body in the world)
 
-Knows how a table is written, which frames its rows name, and which columns a trajectory has by its format; reads its
-head once, then block after block.
+Knows the syntax of tables, the frames that their rows name, and the columns of trajectory formats.  Reads the head
+once, then block by block.
 """
 
 from __future__ import annotations
@@ -61,22 +61,22 @@ if TYPE_CHECKING:
     from frametool.rows.request import Request
     from frametool.text.lines import ByteStream
 
-COUNTER = "frame"  # such a column often counts pictures
+COUNTER = "frame"  # such a column often counts images
 
 BYTE_ORDER_MARK = b"\xef\xbb\xbf"
-COMMENTS = re.compile(rb"(?:#[^\r\n]*|\s*(?:[\r\n]|\Z))*+")  # and empty lines
+COMMENTS = re.compile(rb"(?:#[^\r\n]*|\s*(?:[\r\n]|\Z))*+")  # and blank lines
 UNCLOSED = "a quote is opened here and not closed"
 
 
 class Table(NamedTuple):
-    """How a table is written.
+    """The syntax and the columns of a table.
 
-    delimiter: what is between cells, b"" for blanks
-    names: of its columns, if it has any; width: how many cells a row has
-    head: what comes before the header, or before the first row
-    header: the raw text of the header's cells; title: its whole line; line_end: what ends it
-    source: what it is called
-    normals: the columns of vectors that turn with points; stamped: a column with the name of a stamp is one
+    delimiter: between cells; b"" for blanks
+    names: of the columns, None without a header; width: the number of cells in a row
+    head: the text before the header, or before the first row
+    header: the raw cells of the header; title: its line; line_end: the end of that line
+    source: the name in messages
+    normals: names of columns of vectors that rotate with points; stamped: a column named like stamps holds stamps
     """
 
     delimiter: bytes
@@ -91,28 +91,28 @@ class Table(NamedTuple):
     stamped: bool = True
 
     def split(self, block: bytes) -> Cells:
-        """Find the cells of a block."""
+        """Return the cells of a block."""
         if self.delimiter:
             return split_delimited(block, self.delimiter, self.width)
         return split_blank(block, self.width, comment=b"#")
 
     @property
     def called(self) -> tuple[str, ...]:
-        """Return what columns are called: their names, or their numbers from 1."""
+        """Return the names of the columns, or their numbers from 1."""
         return self.names or tuple(map(str, range(1, self.width + 1)))
 
     def cell(self, text: str) -> bytes:
-        """Write a cell, in quotes where a reader would split it."""
+        """Write a cell, quoted if a reader would split it."""
         cell, marks = text.encode(), {*self.delimiter, *b'"\n\r'} if self.delimiter else set[int]()
         return cell if marks.isdisjoint(cell) else b'"' + cell.replace(b'"', b'""') + b'"'
 
     def name(self, place: int) -> str:
-        """Name a column for messages."""
+        """Return the name of a column for messages."""
         return self.names[place] if self.names else f"column {place + 1}"
 
     def opening(self, layout: Layout) -> bytes:
-        """Return what is before the first row of the output: the header as it was where no column changes."""
-        grown = self.names and len(layout.columns) > self.width  # what was known by its count is not any more
+        """Return the text before the first row of the output; the header is unchanged if no column changes."""
+        grown = self.names and len(layout.columns) > self.width  # more columns than their format has need names
         if not (self.header or grown):
             return self.head
         own = self.header or [*map(self.cell, self.called)]
@@ -125,9 +125,9 @@ def open_table(
     block: bytes, fmt: str, *, header: bool, source: str, expected: object = None,
     known: Callable[[Sequence[str]], bool] = has_pose_column,
 ) -> tuple[Table, bytes]:  # fmt: skip
-    """Look at the first block; return the table and the block without what is before the first row.
+    """Read the head of a table from its first block; return the table and the rest of the block.
 
-    expected: what --from says of numbers without names; known: whether words of a comment are names of columns
+    expected: what --from declares for numbers without names; known: returns True if the words of a comment are a header
     """
     row = FORMATS[fmt].rows
     delimiter = (row.delimiter or "").encode()
@@ -146,13 +146,13 @@ def open_table(
     own = _titled(title, bare._replace(line_end=line[len(title) :] or b"\n"))
     if not own.width and not (delimiter and comments):
         raise FormatError("no rows in it", source=source)
-    count = 0  # of numbers
+    count = 0  # names that are numbers
     for name in own.names or ():
         with suppress(ValueError):
             float(name)
             count += 1
     is_header = header and not (count == own.width if delimiter else count)
-    if header and comments.strip() and not (is_header and known(own.names or ())):  # the last comment may be one
+    if header and comments.strip() and not (is_header and known(own.names or ())):  # the last comment may be the header
         text = comments.rstrip()
         words = text[max(text.rfind(b"\n"), text.rfind(b"\r")) + 1 :].lstrip(b"# \t")
         before, behind = mark + text[: len(text) - len(words)], comments[len(text) :]
@@ -168,7 +168,7 @@ def open_table(
 
 
 def _titled(title: bytes, table: Table) -> Table:
-    """Return a table with the names in a line; without any if there are none."""
+    """Return a table with the names in a line; without columns if the line is empty."""
     cells = tuple(cells_of(title, table.delimiter))
     return table._replace(names=tuple(map(_unquoted, cells)), width=len(cells), header=cells, title=title)
 
@@ -190,9 +190,9 @@ def _unquoted(cell: bytes) -> str:
 
 
 def as_trajectory(table: Table, fmt: str, request: Request) -> tuple[Table, Request]:
-    """Set the columns of a trajectory, unless --from or --columns do; eight numbers without names are TUM.
+    """Set the columns of a trajectory format, unless --from or --columns do; eight columns without names are TUM.
 
-    Raises FormatError for a count of columns that the format does not have.
+    Raises FormatError for a number of columns that the format does not allow.
     """
     row, names, asked = FORMATS[fmt].rows, table.names, request.rows
     if asked.given or asked.columns:
@@ -209,7 +209,7 @@ def as_trajectory(table: Table, fmt: str, request: Request) -> tuple[Table, Requ
     if fmt == "euroc":
         names, ours = table.names or names[: table.width], ours[1:8]
         if (at := stamp_column(names)) is not None and not in_nanoseconds(names[at]):
-            names = (*names[:at], f"{names[at]} [ns]", *names[at + 1 :])  # whatever the file calls them
+            names = (*names[:at], f"{names[at]} [ns]", *names[at + 1 :])  # the unit of EuRoC, whatever the name
     bare, wanted = ([name.split("[")[0].strip() for name in each] for each in (names, ours))
     if missing := [name for name in wanted if name not in bare]:
         raise FormatError(f"no column {', '.join(missing)}", source=table.source, line=1)
@@ -223,7 +223,7 @@ def as_trajectory(table: Table, fmt: str, request: Request) -> tuple[Table, Requ
 def run_table(
     stream: ByteStream, fmt: str, request: Request, *, source: str, header: bool = True
 ) -> Generator[Outcome]:
-    """Yield the outcomes of a table's blocks, the first one its head."""
+    """Yield the outcomes of a table: its head, then each block."""
     rows = TableRows(stream, fmt, request, source, header=header)
     yield Outcome(rows.table.opening(rows.layout), lines=rows.lines, size=rows.taken)
     for text in rows.texts:
@@ -232,22 +232,22 @@ def run_table(
 
 
 class PlannedRows:
-    """Rows that are planned: what is done with each, what it is called, and what one block leaves for the next.
+    """The rows of a table with their plan and the state between blocks.
 
     With `all_numbers` in the request, results are computed for another format and no text is planned.
-    off: the largest deviation of a rotation; mended: how many were normalised
+    off: the largest deviation of a rotation; mended: the number of rotations that were normalised
     inputs: the numbers of the last block as read, one column per row
-    unasked: the column of stamps, where rows move and no option names it
+    unasked: the usual column of stamps, if rows move at the latest time because no option names it
     """
 
     def __init__(self, table: Table, request: Request) -> None:
-        """Plan the rows of a table; raises FormatError or Misused where the request does not fit them."""
+        """Plan the rows of a table; raises FormatError or Misused if the request does not fit its columns."""
         timed, extra, self.unasked = request.timed, request.rows.stamp_or_weight_column, None
         usual = "" if (at := stamp_places(table.names)[0]) is None else table.name(at)
         is_cut = (request.window or request.offset_ns) and extra is None and not (timed and timed.name)
         if lacks_name := extra == "" or is_cut:
             request = request.with_rows(stamp_or_weight_column=usual)
-        if timed is not None and not timed.name:  # rows move at the latest time; an expression knows what theirs is for
+        if timed is not None and not timed.name:  # rows move at the latest time; a formula uses the stamp itself
             self.unasked = timed._replace(name=usual) if usual else None
             request = request._replace(timed=None)
             if request.operation.formula and not request.operation.shown:
@@ -268,23 +268,23 @@ class PlannedRows:
 
     @property
     def columns(self) -> str:
-        """List the columns there are."""
+        """Return the columns of the table for messages."""
         return listed(self.table.called)
 
     def names_of(self, size: int, column: Callable[[int], Coded]) -> BlockNames:
-        """Read the frames that so many rows name, and rename them; column: returns the texts of a column."""
+        """Return the frames that `size` rows and their results name; column: returns the texts of a column."""
         named, frames = self.layout.named, self.layout.frames
         places = named if named != (None, None) else frames
         return self._renamed(places, size, column) if places and size else BlockNames(Coded((self.earth,)))
 
     def _renamed(self, places: Sequence[int | None], size: int, column: Callable[[int], Coded]) -> BlockNames:
-        """Read the names in some columns, and rename them."""
+        """Return the names in some columns, and those of their results."""
         asked = self.request
         texts = [Coded([""]) if place is None else column(place) for place in places]
         (parents, _), (names, _), codes = texts[0], texts[-1], texts[0].of_rows(size)
         found, of_row = np.unique(codes * len(names) + texts[-1].of_rows(size), return_inverse=True)
         pairs = [(parents[code // len(names)], names[code % len(names)]) for code in found.tolist()]
-        if not asked.rows.poses:  # of a look-up
+        if not asked.rows.poses:  # a look-up
             return BlockNames(texts[0] if len(places) == 1 else Coded([*map("\0".join, pairs)], of_row))
         called = next(self.table.name(place) for place in places if place is not None)
         may_count = called == COUNTER and COUNTER not in asked.rows.frames
@@ -298,19 +298,19 @@ class PlannedRows:
             except FrametoolError as error:
                 bad |= dict.fromkeys(np.flatnonzero(of_row == at).tolist(), (called, error))
             for place, name, result in zip(places, pair, results[at], strict=True):
-                if place is not None and name and not result:  # a cell named a frame, and the result does not
+                if place is not None and name and not result:  # the result lacks a frame that the row names
                     lost.setdefault(int((of_row == at).argmax()), name)
         known = [None if not text or text in counters else text for text in parents]
         own = Coded((self.earth,)) if self.earth else Coded(known, codes)
         return BlockNames(own, pairs, results, of_row, dict(sorted(lost.items())[:1]), bad)
 
     def ran(self, block: Block) -> Run:
-        """Return what becomes of a block, with its warnings in order."""
+        """Compute a block and sort its warnings."""
         run = Run(self.plan, block, self.state)
         self.mended += len(run.mended)
         self.off = max(self.off, run.off)
         for frame in block.frames[0].texts if run.count else ():
-            with suppress(FrametoolError):  # rows of unknown frames say so themselves
+            with suppress(FrametoolError):  # unknown frames are reported as bad rows
                 if self.unasked is not None and self.unasked.moves(frame):
                     remedy = f"give --time-column {quote(self.unasked.name)}, or --at TIME"
                     ignored = f"column {self.unasked.name!r} is not looked at, rows move at the latest time; {remedy}"
@@ -322,7 +322,7 @@ class PlannedRows:
     def poses_of(self, run: Run, column: Callable[[int], Any], lines: Ints) -> RowPoses:
         """Return the results of a block for another format.
 
-        column: returns the cells of a column; lines: of the block's rows, from 0
+        column: returns the cells of a column; lines: (n,) the lines of the block's rows, from 0
         """
         layout, block, plan = self.layout, run.block, self.plan
         rows, numbers = run.settled(run.end)
@@ -331,13 +331,13 @@ class PlannedRows:
         others = [each.place for each in layout.columns if isinstance(each, Kept) and each.place not in used]
         extras = {self.table.name(place): taken(column(place), rows) for place in others}
         own = numbers.shape[1]
-        if plan.shapes and plan.shapes[-1].kind in (NORMAL, RATE):  # vectors that turn along come last
+        if plan.shapes and plan.shapes[-1].kind in (NORMAL, RATE):  # vectors rotated with a pose come last
             own -= 3 * (len(plan.targets) - 1)
         for each in layout.columns:
             if isinstance(each, New) and isinstance(each.piece, Out) and each.piece.first >= own:
                 extras[each.name] = numbers[:, each.piece.first]
         stamps = block.stamps[0][rows] if layout.times else None
-        # known of places, and of an expression
+        # the frames of geodetic positions and of formulas
         unnamed = (self.earth, None) if self.rename is None else self.rename(self.earth, None)
         parents, names = (
             [name] if place is None else block.names.texts(role, rows)
@@ -352,14 +352,14 @@ class PlannedRows:
 class TableRows(PlannedRows):
     """The rows of a table, block by block.
 
-    texts: those of the blocks; taken, lines: how many bytes and lines the head had
+    texts: the blocks of text; taken, lines: the number of bytes and lines of the head
     """
 
     def __init__(self, stream: ByteStream, fmt: str, request: Request, source: str, *, header: bool = True) -> None:
-        """Read the head of a table in a format, and plan its rows; raises FormatError or Misused."""
+        """Read the head of a table, and plan its rows; raises FormatError or Misused."""
         delimiter = (FORMATS[fmt].rows.delimiter or "").encode()
         blocks, first = read_blocks(stream, whole=RecordEnds(delimiter) if delimiter else whole_lines), b""
-        for block in blocks:  # up to one that holds more than comments
+        for block in blocks:  # up to the first that holds more than comments
             first += block
             if COMMENTS.fullmatch(first.removeprefix(BYTE_ORDER_MARK)) is None:
                 break
@@ -374,13 +374,13 @@ class TableRows(PlannedRows):
 
     def steps(self) -> Iterator[tuple[RowPoses, Outcome]]:
         """Yield the results of each block for another format."""
-        for text in chain((b"",), self.texts):  # the head has no rows, but columns
+        for text in chain((b"",), self.texts):  # first the columns, without rows
             run, outcome, cells = self.of_text(text)
             outcome = outcome if text else Outcome(b"", lines=self.lines, size=self.taken)
             yield self.poses_of(run, cells.column, cells.lines_before()[cells.rows]), outcome
 
     def of_text(self, text: bytes) -> tuple[Run, Outcome, Cells]:
-        """Return what becomes of a block, and its outcome; behind a quote that is not closed nothing is read."""
+        """Compute a block; nothing after a quote that is not closed is read."""
         table, layout = self.table, self.layout
         torn = torn_record(text, table.delimiter) if table.delimiter else None
         cells = table.split(text[:torn])
@@ -395,10 +395,10 @@ class TableRows(PlannedRows):
         return run, Outcome(b"", faults, rows, text.count(b"\n"), len(run.mended), run.notes, len(text)), cells
 
     def block_of(self, cells: Cells) -> Block:
-        """Find the rows of a block, their numbers, their names, and the stretches of text that pass."""
+        """Find the rows of a block: their numbers, names and stamps, and the lines that are copied."""
         table, layout = self.table, self.layout
         places = layout.places
-        is_run = places and places == tuple(range(places[0], places[0] + len(places)))  # then nothing is copied
+        is_run = places and places == tuple(range(places[0], places[0] + len(places)))  # avoids a copy
         own = slice(places[0], places[-1] + 1) if is_run else list(places)
         numbers = Spans(cells.data, cells.starts[:, own], cells.ends[:, own])
         if places and (cells.data == ord('"')).any():
@@ -423,7 +423,7 @@ class TableRows(PlannedRows):
         return Block(numbers, {}, cells.rows, line_of, unchanged, broken, names, [stamps], bad, frames=frames)
 
     def parts_of(self, cells: Cells, run: Run) -> dict[Any, Spans]:
-        """Return the text around the results of a block, and the names in them."""
+        """Return the unchanged text around the results of a block, and the names of frames in it."""
         return {
             (part := piece.part): self._names(cells, part.place, part.role, run) if isinstance(part, Named)
             else Spans(cells.data, _bounds(cells, part[0]), _bounds(cells, part[1]))
@@ -431,7 +431,7 @@ class TableRows(PlannedRows):
         }  # fmt: skip
 
     def _names(self, cells: Cells, place: int, role: int, run: Run) -> Spans:
-        """Write names as cells; one that does not change, or of a row without a result, stays as it is written."""
+        """Write names as cells; a name that does not change, or of a bad row, keeps its spelling."""
         names, of_row = run.block.names, run.block.names.of_row
         new = spans_of([self.table.cell(result[role]) for result in names.results])
         pairs = zip(names.pairs, names.results, strict=True)
@@ -442,7 +442,7 @@ class TableRows(PlannedRows):
         return Spans(data, starts, np.where(same, cells.ends[:, place] + behind, new.ends[of_row]))
 
     def _at_other_times(self, text: bytes, cells: Cells, offset_ns: int) -> bytes:
-        """Return rows with so much added to their stamps; what is no stamp stays and is reported when it is read."""
+        """Return rows with an offset added to their stamps; an invalid stamp is unchanged, and reported later."""
         columns = [without_quotes(cells.column(place)) for place in self.layout.times]
         in_ns = in_nanoseconds(self.table.name(self.layout.times[0]))
         stamps, reasons = read_stamps(columns, in_ns=in_ns)
@@ -456,7 +456,7 @@ class TableRows(PlannedRows):
 
 
 def _bounds(cells: Cells, at: int) -> Ints:
-    """Return where the rows are at a bound: 0 is the start of the line, 1 that of the first cell, 2 its end, .."""
+    """Return the offset of a bound in each row: 0 is the start of the line, 1 that of the first cell, 2 its end, .."""
     place, is_end = divmod(at - 1, 2)
     if 0 <= place < cells.starts.shape[1]:
         return (cells.ends if is_end else cells.starts)[:, place]
