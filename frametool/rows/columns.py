@@ -1,7 +1,7 @@
 """Find points and poses among the columns of a table by name: `x y z`, `qx qy qz qw`, `roll_deg ..`, with affixes.
 
-A common prefix or suffix is one that is set off: `pose.qx`, `qx_left`, `field.pose.orientation.x`. A unit is right
-behind a name (`x_mm`, `roll_deg`) or in brackets at its end (`x [mm]`, `yaw (rad)`). Knows names only.
+A common prefix or suffix is separated from the name: `pose.qx`, `qx_left`, `field.pose.orientation.x`.  A unit follows
+a name (`x_mm`, `roll_deg`) or is in brackets at its end (`x [mm]`, `yaw (rad)`).  Knows names only.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
     from frametool.rows.request import Request
 
-    Spot = tuple[int, str]  # a column's place, and the unit that its name says
+    Spot = tuple[int, str]  # a column's place, and the unit in its name
 
 XYZ, BARE = ("x", "y", "z"), ("", "")
 QUATERNION = (*XYZ, "w")
@@ -38,7 +38,7 @@ LETTERS = {
     WRENCH: ((*FORCES, "tx", "ty", "tz"), (*FORCES, "mx", "my", "mz")),
 }
 MOST_SHOWN, MOST_LISTED = 8, 40  # columns in a message
-# behind an underscore or a blank: the first are read, the second are units of a length that are refused
+# after an underscore or a blank: the first group is supported, the second is refused
 UNITS = re.compile(r"[_ ](deg|rad|mm|cm|um|m)(?![^\W_])|[_ ](km|in|ft|s|e7)$")
 TOKEN = re.compile(r"[^\W_]+")
 
@@ -46,8 +46,8 @@ SIGMAS = [f"sigma_{part}" for part in ("xyz", "rpy", *XYZ, "roll", "pitch", "yaw
 WORDS = {word for row in ROTATIONS.values() for word in (*row.columns, *row.names, *row.alone) if word}.union(
     *POSITIONS, *(row.whole.columns for row in ROTATIONS.values() if row.whole)
 )
-NAMES_OF = {word: word for word in (*WORDS, *SIGMAS)} | COLUMN_WORDS | PLACE_WORDS  # what each word is called here
-# x, y and z behind these are no position; those of STEMS are a prefix, as before the keys of a map
+NAMES_OF = {word: word for word in (*WORDS, *SIGMAS)} | COLUMN_WORDS | PLACE_WORDS  # the canonical name of each word
+# x, y and z after these words are no position; STEMS are prefixes of the keys of a quaternion
 WHOLE = {word for row in ROTATIONS.values() for word in row.columns}
 WHOLE |= {word for word, name in COLUMN_WORDS.items() if name[0] != "t"}
 STEMS = {word[:-1] for word, name in COLUMN_WORDS.items() if name[0] == "q"}
@@ -59,9 +59,10 @@ for _word in sorted(NAMES_OF, key=len, reverse=True):
 
 
 class Units(NamedTuple):
-    """The units that the names of some columns may say: of what they are, and what each means.
+    """The units that the names of some columns may state.
 
-    never: columns of these are something else
+    of: the quantity, for messages; known: the meaning of each unit
+    never: columns with these units are something else
     """
 
     of: str
@@ -70,7 +71,7 @@ class Units(NamedTuple):
 
 
 NO_UNIT: dict[str, float | bool | None] = {"": None, "-": None, "1": None}
-LENGTH = Units(  # numbers a metre
+LENGTH = Units(  # units per metre
     f"of a length; known are {', '.join(filter(None, LENGTHS))}", LENGTHS, frozenset((*ANGLES, "s"))
 )  # fmt: skip
 ANGLE = Units("of an angle; known are deg, rad", NO_UNIT | ANGLES)  # True: degrees
@@ -81,15 +82,15 @@ RATE = Units("of a velocity or a force", NO_UNIT, LENGTH.never.union(filter(None
 class Columns(NamedTuple):
     """Columns that belong together.
 
-    places: where they are, in the order of their meaning; names: as the header writes them
-    affixes: what is before and behind the names
-    unit: numbers a metre of a position
-    notation: that of a rotation
-    said: for each word that was looked for what its unit means, None where it says none
-    whole: the numbers of a whole pose
-    absent: which words have no column
+    places: their indices, in the order of their meaning; names: as in the header
+    affixes: the common text before and after the names
+    unit: of a position, in units per metre
+    notation: of a rotation
+    said: the meaning of the unit of each word that was looked for; None without a unit
+    whole: they hold a whole pose, position and rotation
+    absent: the indices of words without a column
     kind: twist or wrench, of six columns
-    wrong: what is wrong with the names, an error where the columns are used
+    wrong: the error in the names, raised only if the columns are used
     """
 
     places: tuple[int, ...]
@@ -105,7 +106,7 @@ class Columns(NamedTuple):
 
     @property
     def shown(self) -> str:
-        """Name the columns."""
+        """Return the names for messages."""
         return " ".join(self.names)
 
 
@@ -117,20 +118,20 @@ class PoseColumns(NamedTuple):
 
     @property
     def places(self) -> tuple[int, ...]:
-        """Return where their numbers are."""
+        """Return the indices of the columns of all numbers."""
         first = self.position.places if self.position else ()
         return first + self.rotation.places if self.rotation else first
 
 
 class Header:
-    """The names of a table's columns, taken apart once: which words of ours each holds, and in which unit.
+    """The names of a table's columns, parsed once: the known words in each, and its unit.
 
-    found: by affixes and word the first column of each unit
-    of_aircraft: roll, pitch, yaw are there by their Greek letters, theta among them is no turn about z
+    found: for each pair of affixes and each word, the first column of each unit
+    of_aircraft: phi, theta and psi are roll, pitch and yaw; theta alone would be a rotation about z
     """
 
     def __init__(self, names: Sequence[str], hidden: Collection[int] = ()) -> None:
-        """Look for the words of all kinds of columns in the names, but for some columns that are hidden."""
+        """Find the known words in all names but those of hidden columns."""
         names = ["" if at in hidden else name for at, name in enumerate(names)] if hidden else names
         self.names = names
         self.count = Counter(names)
@@ -161,11 +162,11 @@ class Header:
 
     @property
     def has_pose(self) -> bool:
-        """Return True if one of the columns may be one of a pose or a point."""
+        """Return True if one of the columns may belong to a pose or a point."""
         return any(not WORDS.isdisjoint(words) for words in self.found.values())
 
     def spots(self, places: Iterable[int]) -> list[Spot | None]:
-        """Return columns as they were chosen, with the units that their names say."""
+        """Return chosen columns with the units in their names."""
         found: list[Spot | None] = []
         for place in places:
             name = self.names[place].lower()
@@ -176,10 +177,10 @@ class Header:
     def match(
         self, base: Sequence[str], of: Units = NUMBER, angles: Sequence[int] = (), *, partly: bool = False
     ) -> Iterator[Columns]:
-        """Yield the columns that have all words of a base under common affixes; `partly` those that have just some.
+        """Yield the columns with all words of `base` under common affixes; if `partly`, those with only some of them.
 
-        of: the units of all but the angles; columns of one unit belong together, and those of several only where each
-        word has one column.
+        of: the units of all words but the angles.  Columns of one unit belong together; columns of several units belong
+        together only if each word has a single one.
         """
         for affixes, group in self.found.items():
             if group.keys().isdisjoint(base) or (group.keys() >= {*base}) == partly:
@@ -189,7 +190,7 @@ class Header:
             shared = [unit for unit in (alike[0] if alike else ()) if all(unit in spots for spots in alike)]
             units = shared or ("",)
             found = [[spots.get(unit) or next(iter(spots.values()), None) for spots in words] for unit in units]
-            if len(alike) < len(base) and not partly:  # an axis has one angle, the nearest: with angle and angle_deg
+            if len(alike) < len(base) and not partly:  # of angle and angle_deg take the one nearest to the axis
                 spread = [max(filter(None, spots))[0] - min(filter(None, spots))[0] for spots in found]
                 found = [spots for spots, size in zip(found, spread, strict=True) if size == min(spread)]
             for spots in found:
@@ -200,7 +201,7 @@ class Header:
         self, spots: Sequence[Spot | None], of: Units = NUMBER, angles: Sequence[int] = (),
         affixes: tuple[str, str] = BARE,
     ) -> Columns:  # fmt: skip
-        """Name the columns that were found for some words under some affixes, and read their units."""
+        """Return the columns found for some words under some affixes, with their units."""
         places, _ = zip(*filter(None, spots), strict=True)
         names, said, absent, wrong = tuple(map(self.names.__getitem__, places)), list[Any](), list[int](), ""
         for at, spot in enumerate(spots):
@@ -220,26 +221,26 @@ class Header:
         return Columns(places, names, affixes, unit, said=tuple(said), absent=tuple(absent), wrong=wrong)
 
     def is_plain(self, match: Columns) -> bool:
-        """Return True if a column has the affixes of a position, or no affix: `yaw`, `pose.yaw`, and not `yaw_rate`."""
+        """Return True if a column has no affix or those of a position: `yaw`, `pose.yaw`, but not `yaw_rate`."""
         return match.affixes == BARE or not {base[0] for base in POSITIONS}.isdisjoint(self.found[match.affixes])
 
     def is_map(self, match: Columns) -> bool:
-        """Return True if x, y, z, w are the keys of a quaternion: with affixes, or if there is nothing else."""
+        """Return True if x, y, z, w are a quaternion: under affixes, or if there are no other columns."""
         return match.affixes != BARE or len(self.names) == len(QUATERNION)
 
 
 def _unit(bracket: re.Match[str] | None, said: re.Match[str] | None) -> str:
-    """Return the unit that is in brackets, else that behind an underscore."""
+    """Return the unit in brackets, else the one after an underscore."""
     return bracket[1].lower() if bracket else (said[1] or said[2]) if said else ""
 
 
 def has_pose_column(names: Iterable[str]) -> bool:
-    """Return True if one of some names is that of a column of a pose or a point."""
+    """Return True if one of the names may be that of a column of a pose or a point."""
     return Header(list(names)).has_pose
 
 
 def find_positions(header: Header) -> list[Columns]:
-    """Return every three columns that can be a position."""
+    """Return all triples of columns that can be a position."""
     found = dict[tuple[int, ...], Columns]()
     for match in chain.from_iterable(header.match(base, LENGTH) for base in POSITIONS):
         if not (header.is_map(match) and header.found[match.affixes].keys() >= {*QUATERNION}):
@@ -249,7 +250,7 @@ def find_positions(header: Header) -> list[Columns]:
 
 
 def find_rotations(header: Header, expected: Notation | None) -> list[Columns]:
-    """Return every set of columns that can be a rotation, of the expected notation if there is one."""
+    """Return all sets of columns that can be a rotation, of the expected notation if there is one."""
     rows, found = _searched(expected), dict[frozenset[int], Columns]()
     for row in rows:
         named = header.match(row.names if row.shape == NAMED else ())
@@ -257,7 +258,7 @@ def find_rotations(header: Header, expected: Notation | None) -> list[Columns]:
         maps = (each for each in named if expected or header.is_map(each))
         for match in chain(header.match(row.columns, angles=row.angles), maps, whole):
             found[frozenset(match.places)] = rotation_of(match, row, expected)
-    alone = list[Columns]()  # of columns that say one by themselves, where none of the others is there: `yaw`, `theta`
+    alone = list[Columns]()  # single columns that suffice if the others are absent: `yaw`, `theta`
     for kind, word in () if found or header.of_aircraft else [(row, word) for row in rows for word in row.alone]:
         *others, _ = kind.columns
         for match in header.match((*others, word), angles=kind.angles, partly=True):
@@ -270,13 +271,13 @@ SEARCHED = {frozenset(row.columns): row for row in reversed(ROTATIONS.values()) 
 
 
 def _searched(expected: Notation | None) -> list[Representation]:
-    """Return the representations whose columns are looked for, of those that share their columns the first."""
+    """Return the representations to look for; of those with the same columns the first."""
     own = expected.representation if expected else None
     return [*SEARCHED.values()][::-1] if own is None else [SEARCHED[frozenset(own.columns)] if own.searched else own]
 
 
 def rotation_of(columns: Columns, row: Representation, expected: Notation | None) -> Columns:
-    """Take the notation that a rotation's columns say, with the unit of angles if they all have one."""
+    """Return columns with their notation, which has the unit of the angles if that is the same for all."""
     units = {columns.said[at] for at in row.angles if at not in columns.absent}
     suffix = "_deg" if units == {True} else "_rad" if units == {False} else ""
     axes = f":{expected.axes}" if expected is not None and expected.axes else ""
@@ -287,7 +288,7 @@ def rotation_of(columns: Columns, row: Representation, expected: Notation | None
 
 
 def find_poses(header: Header, expected: Notation | None, count: int) -> list[PoseColumns]:
-    """Find so many points or poses; raises ValueInvalid that lists the candidates, or the columns there are."""
+    """Find `count` points or poses; raises ValueInvalid with the candidates, or with all columns."""
     positions, rotations = find_positions(header), find_rotations(header, expected)
     if len(positions) > 1:
         positions = [each for each in positions if each.names not in NORMALS]
@@ -300,9 +301,9 @@ def find_poses(header: Header, expected: Notation | None, count: int) -> list[Po
 
 @lru_cache(maxsize=256)  # records of one kind have the same keys
 def plain_pose(names: tuple[str, ...], *, affixed: bool) -> PoseColumns:
-    """Find the one point or pose among the keys of a record: without affixes, else under some if it may be `affixed`.
+    """Find the one point or pose among the keys of a record: without affixes, else if `affixed` under some.
 
-    Raises ValueInvalid for several rotations or positions, and for a rotation that is there by half.
+    Raises ValueInvalid for several rotations or positions, and for an incomplete rotation.
     """
     header = copy(full := Header(names))
     header.found = {key: group for key, group in full.found.items() if key[0] in ("", *STEMS) and not key[1]}
@@ -317,9 +318,9 @@ def plain_pose(names: tuple[str, ...], *, affixed: bool) -> PoseColumns:
 def paired(
     header: Header, positions: Sequence[Columns], rotations: Sequence[Columns], count: int = 1
 ) -> list[PoseColumns]:
-    """Put each rotation with the position that shares most of its affixes, or with the half of one that is there.
+    """Pair each rotation with the position whose affixes are most similar, else with an incomplete position.
 
-    Raises ValueInvalid for more or fewer than so many.
+    Raises ValueInvalid if there are not `count` poses.
     """
     poses, left = list[PoseColumns](), positions
     for rotation in rotations:
@@ -342,7 +343,7 @@ def paired(
 
 
 def _half_position(header: Header, rotation: Columns) -> Columns | None:
-    """Return x, y with a turn about z, a pose in the plane; other parts of a position are wrong if they are used."""
+    """Return x, y with a rotation about z, a pose in the plane; other incomplete positions are errors if used."""
     for base in POSITIONS:
         for match in header.match(base, LENGTH, partly=True):
             if len(match.absent) > 1 or match.affixes not in (rotation.affixes, BARE):
@@ -356,12 +357,12 @@ def _half_position(header: Header, rotation: Columns) -> Columns | None:
 
 
 def listed(names: Sequence[str]) -> str:
-    """List the columns there are, the first of very many."""
+    """Return the names of the columns for messages, of very many only the first."""
     return first_of(names, MOST_LISTED, quote=bare)
 
 
 def _half_rotation(header: Header, expected: Notation | None) -> str:
-    """Return what is missing of a rotation that is there by half, or goes by other names; "" if absent."""
+    """Return the message for a rotation that is incomplete or has unusual names; "" if there is none."""
     for row in ROTATIONS.values() if expected is None else ():
         if not row.searched and (match := next(header.match(row.columns, angles=row.angles), None)):
             return f"columns {match.shown} may be {row.name}; then add --from {row.spelling}"
@@ -388,7 +389,7 @@ def _half_rotation(header: Header, expected: Notation | None) -> str:
 
 
 def find_six(header: Header, kind: str) -> Columns | None:
-    """Find the columns of a twist or a wrench, by the words of its parts; by usual letters only where asked."""
+    """Find the columns of a twist or a wrench by the names of its parts; by the usual letters only if `kind` is set."""
     for each in [kind] if kind else LETTERS:
         for base in (six_names(each), *LETTERS.get(kind, ())):
             for match in header.match(base, RATE):
@@ -398,7 +399,7 @@ def find_six(header: Header, kind: str) -> Columns | None:
 
 
 def row_shape(pose: PoseColumns, request: Request, kind: str) -> Shape:
-    """Return what the numbers of a pose's columns mean; kind: what they are taken for, "" as they look."""
+    """Return the shape of a row from its columns; kind: the requested kind, "" to decide by the columns."""
     position, rotation = pose
     if position and position.kind:
         if not request.operation.moves:
@@ -427,10 +428,10 @@ def row_shape(pose: PoseColumns, request: Request, kind: str) -> Shape:
 
 
 def chosen_pose(spec: str, names: Sequence[str] | None, width: int, request: Request, kind: str) -> PoseColumns:
-    """Take columns by name or by position from 1 (`2-8`): x y z, a rotation's, or first the one and then the other.
+    """Return the columns in `spec`, by name or by number from 1 (`2-8`): x y z, a rotation, or x y z and a rotation.
 
-    kind: what --as says; a twist or a wrench has six.
-    Raises Misused for names that are not there, or a count that says nothing.
+    kind: of --as; a twist or a wrench has six columns
+    Raises Misused for names that do not exist, or a number of columns with no meaning.
     """
     header, places = places_named(spec, names, width)
     size, expected = len(places), request.rows.given
@@ -455,7 +456,7 @@ def chosen_pose(spec: str, names: Sequence[str] | None, width: int, request: Req
 
 
 def named_rotation(header: Header, places: Sequence[int], expected: Notation | None) -> Columns | None:
-    """Return the rotation that all of the chosen columns are by their names, in their order."""
+    """Return the rotation that the chosen columns are by their names, in this order; None if they are not."""
     named = Header([header.names[place] for place in places])
     for each in [each for own in dict.fromkeys((expected, None)) for each in find_rotations(named, own)]:
         if each.places == tuple(range(len(places))):
@@ -464,9 +465,9 @@ def named_rotation(header: Header, places: Sequence[int], expected: Notation | N
 
 
 def by_count(expected: Notation | None) -> dict[int, tuple[int, Notation | None]]:
-    """Return, for each count of columns that says what they are, how many are a position, and what rotation the others.
+    """Return, for each meaningful number of columns, how many are a position, and the notation of the others.
 
-    Twelve are three rows of a pose only where a matrix is expected.
+    Twelve are three rows of a pose only if a matrix is expected.
     """
     if expected is None:
         wholes = [parse_notation(row.name) for row in ROTATIONS.values() if row.whole]
@@ -479,7 +480,7 @@ def by_count(expected: Notation | None) -> dict[int, tuple[int, Notation | None]
 
 
 def places_named(spec: str, names: Sequence[str] | None, width: int) -> tuple[Header, list[int]]:
-    """Return the header, and the places of the columns that are chosen by names, numbers or ranges from 1."""
+    """Return the header, and the indices of columns chosen by names, numbers or ranges from 1."""
     numbers = {name: place for place, name in reversed([*enumerate(names or ())])}
     places = list[int]()
     for word in map(str.strip, spec.split(",")):

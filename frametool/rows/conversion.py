@@ -2,13 +2,13 @@
 
 rows -> the operation -> blocks of poses or points -> the other format
 
-`read` makes of the rows of a table frames that move, of which each is a pose at its time:
+`read` reads a table as frames; each row is the pose of a moving frame at its stamp, or of a static frame:
 
-stamp,x,y,z,qx,qy,qz,qw                      frames as --frames says, `world` and `body` if it does not
+stamp,x,y,z,qx,qy,qz,qw                      frames of --frames, by default `world` and `body`
 stamp_ns,parent,name,x,y,yaw_deg             each row names its frames
-parent,name,x,y,z,roll,pitch,yaw             no stamps: frames that are static
+parent,name,x,y,z,roll,pitch,yaw             without stamps frames are static
 
-Without names of columns rows are those of tum, t x y z qx qy qz qw,
+Rows without names of columns are those of tum, t x y z qx qy qz qw,
 
     1305031102.1758 1.34 0.62 1.65 0.657 0.612 -0.295 -0.311
 
@@ -16,7 +16,7 @@ of kitti, three rows of a matrix,
 
     1.0 0.0 0.0 0.5 0.0 1.0 0.0 0.0 0.0 0.0 1.0 2.0
 
-or of euroc, nanoseconds, x y z, qw qx qy qz, and what else it has:
+or of euroc, nanoseconds, x y z, qw qx qy qz, then other numbers:
 
     1403636580838555648,4.688319,-1.786938,0.783338,0.534108,-0.153029,-0.827383,-0.082152
 """
@@ -53,15 +53,15 @@ if TYPE_CHECKING:
     from frametool.rows.sources.column_files import ColumnRows
     from frametool.text.lines import ByteStream
 
-    Step: TypeAlias = tuple[RowPoses, Outcome]  # what a block became, and what is reported about it
+    Step: TypeAlias = tuple[RowPoses, Outcome]  # the results of a block, and its outcome
 
 QUATERNION = notation("quaternion")
 NO_ROTATION = "no rotation among the columns {}: poses are wanted"
-AS_VALUES = Style("json")  # of results that are not written
+AS_VALUES = Style("json")  # for results that are not written
 
 
 def writer_for(style: Style, first: RowPoses) -> PoseWriter:
-    """Return what writes blocks in the format of a style: text, columns of numbers, or messages of a recording."""
+    """Return the writer of blocks in the format of a style: text, columns of numbers, or messages of a recording."""
     if holds(style.format, "arrays"):
         from frametool.rows.sinks.as_arrays import ArrayWriter
 
@@ -75,15 +75,15 @@ def writer_for(style: Style, first: RowPoses) -> PoseWriter:
 
 
 class Blocks(ResultWriter):
-    """Write blocks of things of one kind, those of the first block, in the format of a style."""
+    """Write blocks of rows of one kind, that of the first block, in the format of a style."""
 
     def __init__(self, style: Style) -> None:
-        """Begin without any."""
+        """Begin without blocks."""
         self.style = style
         self.writer: PoseWriter | None = None
 
     def of_block(self, block: RowPoses | BlockResults) -> bytes:
-        """Return what is written of a block of rows, or of results."""
+        """Add a block of rows, or of results; return the text that can be written now."""
         if not isinstance(block, RowPoses):
             is_text = not holds(self.style.format, "arrays")
             block = block_of(block, timed=is_text)
@@ -97,7 +97,7 @@ class Blocks(ResultWriter):
         return self.writer.of_block(block._replace(placed=self.writer.placed))
 
     def end(self) -> Iterator[bytes]:
-        """Yield what comes behind the last."""
+        """Yield the rest of the text."""
         if self.writer is None:
             self.of_block(NO_ROWS)
         yield from self.writer.end()  # type: ignore[union-attr]
@@ -112,8 +112,8 @@ def poses_text(values: Iterable[Value], style: Style) -> str:
 class FormatConverter:
     """Convert a stream of poses or points to another format, block by block.
 
-    rows: the planned rows, from the first step on
-    tally: what was assumed about a trajectory
+    rows: the planned rows, set by the first step
+    tally: the assumptions about a trajectory
     """
 
     rows: TableRows | ColumnRows
@@ -121,7 +121,7 @@ class FormatConverter:
     def __init__(
         self, fmt: str, request: Request, source: str, style: Style = AS_VALUES, answers: Answers = Answers()  # noqa: B008
     ) -> None:
-        """Store the request; raises Misused for options that need a table in its own format."""
+        """Store the request; raises Misused for options that only apply to tables in their own format."""
         if request.results.keep or (request.results.prefix and not request.operation.extras(Shape(POSE))):
             raise Misused("--keep and --prefix are for tables that stay in their form")
         self.fmt = fmt
@@ -132,20 +132,20 @@ class FormatConverter:
         self.style = style.changed()
         in_ecef = request.with_results(place=None, last_place=request.results.place)
         self.request = in_ecef.with_results(all_numbers=True, notations=(QUATERNION,), keep_sign=True)
-        # whose TARGET each row was checked for
+        # each row was checked against TARGET
         self.looks_up_places = request.results.place is not None and not request.rows.poses
         has_nulls = style.format in LEARNED or holds(style.format, "arrays")
         if request.on_error == NULL and not (self.is_table and has_nulls):
             raise Misused(f"--on-error null: {style.format} of {fmt} cannot hold a row without a result; give skip")
 
     def outcomes(self, stream: ByteStream, *, header: bool = True) -> Generator[Outcome]:
-        """Yield the text of the results, block by block, and what comes behind the last."""
+        """Yield the text of the results, block by block, and warn about assumptions at the end."""
         yield from written_by(Blocks(self.style), self._to_write(stream, header=header), self.request.on_error)
         for finding in self.tally.findings():
             warn(f"{self.source}:{finding.line}: {finding.message}")
 
     def _to_write(self, stream: ByteStream, *, header: bool) -> Iterator[Outcome]:
-        """Yield the results to be written, with the warnings about them."""
+        """Yield the outcome of each block with the results to write and the warnings about them."""
         operation, place = self.request.operation, self.style.place
         for poses, outcome in self.steps(stream, header=header):
             has_more = poses.more and poses.kind != POSE and operation.formula is not None
@@ -162,14 +162,14 @@ class FormatConverter:
             yield outcome._replace(results=poses, notes=notes, kept=len(poses.numbers))
 
     def steps(self, stream: ByteStream, *, header: bool = True) -> Iterator[Step]:
-        """Yield the results of one block after the other, first a block without any.
+        """Yield the results of each block, after a first block without rows.
 
-        Stamps are those of a file, those of the rows, or their numbers as seconds.
+        Stamps are those of a --stamps file, else of the rows; formats that count their rows get one per second.
         """
         is_table, other, fmt = self.is_table, self.style.format, FORMATS[self.fmt].rows
         rows = TableRows(stream, self.fmt, self.request, self.source, header=header) if is_table else self._rows(stream)
         self._begin(rows)
-        # stamps that only count are no loss where the other format has no place for them
+        # stamps that only count may be dropped if the other format has no place for them
         counts = bool(fmt.counted) and not (self.answers.stamps or (self.fmt == "g2o" and self.answers.edges))
         has_no_place = holds(other, "recording") or FORMATS[other].rows.counted
         are_lost = counts and (self.request.rows.stamps == NO_STAMPS or has_no_place)
@@ -180,7 +180,7 @@ class FormatConverter:
         is_placed, count = self.looks_up_places or self.shape.kind == POINT or self.shape.place is not None, 0
         for found, outcome in rows.steps() if is_table else self._without_gaps(rows):
             poses = self._placed(found, names) if is_placed else found
-            # bad rows have a time too
+            # a bad row uses up a stamp, too
             every = np.union1d(poses.lines, [each.line for each in outcome.faults]) if outcome.faults else poses.lines
             at, before, count = np.searchsorted(every, poses.lines), count, count + len(every)
             stamps = None if are_lost else poses.stamps_ns
@@ -195,7 +195,7 @@ class FormatConverter:
             describe(Options(self.tally, Topics(), answers=self.answers), fmt, count, named=False)
 
     def _rows(self, stream: ByteStream) -> ColumnRows:
-        """Plan the rows of a stream of columns of numbers, or of listed poses."""
+        """Plan the rows of a stream of binary columns, or of a file that lists poses."""
         from frametool.rows.sources.column_files import ColumnRows, ListedPoses, move_along
 
         file = InputFile("-" if self.source == "stdin" else self.source, cast("BinaryIO", stream))
@@ -209,7 +209,7 @@ class FormatConverter:
         return ColumnRows(columns, self.request, self.source)
 
     def _without_gaps(self, rows: TableRows | ColumnRows) -> Iterator[Step]:
-        """Yield the results of columns without the rows that have no numbers; text has no place for these."""
+        """Yield the results without rows that have no numbers, which text formats cannot hold."""
         left_out = 0
         for poses, outcome in rows.steps():
             there = np.flatnonzero(~np.isnan(poses.numbers[:, 0]))
@@ -221,7 +221,10 @@ class FormatConverter:
             warn(f"{self.source}: {what}: {self.style.format} has no place for them")
 
     def _begin(self, rows: TableRows | ColumnRows) -> None:
-        """Decide what rows become: without a rotation points, where no option chose one; raises FormatError."""
+        """Determine the kind of the results: points, if there is no rotation and no option chose one.
+
+        Raises FormatError if the format cannot hold it.
+        """
         self.rows, shape, (target, *_) = rows, rows.shape, rows.plan.targets
         self.placed = target.unit is not None
         is_bare = shape.kind == POSE and shape.notation is None and bool(self.request.rows.poses)
@@ -232,15 +235,15 @@ class FormatConverter:
         self.shape = shape._replace(kind=POINT) if has_none else shape
 
     def _placed(self, poses: RowPoses, names: Sequence[str]) -> RowPoses:
-        """Return points with their own covariance, and places with lat, lon, alt as read where these are written again.
+        """Return points with their own covariance only, and geodetic positions as read if they are written again.
 
-        names: of what comes with each
+        names: of the numbers after each point
         """
         place, operation = self.shape.place, self.request.operation
         if self.looks_up_places:
             poses = poses._replace(parents=EARTH_FRAMES[:1])
         every = operation.extras(self.rows.shape)
-        if self.shape.kind == POINT and len(names) < len(every):  # of rows that were read as poses
+        if self.shape.kind == POINT and len(names) < len(every):  # rows that were read as poses
             columns = [*range(3), *(3 + every.index(name) for name in names)]
             poses = poses._replace(numbers=poses.numbers[:, columns])
         is_written = holds(self.style.format, "recording") or self.style.place
@@ -256,9 +259,9 @@ class FormatConverter:
 
 
 def read(file: InputFile, options: Options) -> Iterator[EdgeColumns]:
-    """Yield the rows of a table as poses of one frame, or of those that its columns name.
+    """Yield the rows of a table as poses of one frame, or of the frames that their columns name.
 
-    Raises or reports FormatError with the line of a row that is no pose.
+    Raises or reports FormatError with the line of a row without a valid pose.
     """
     fmt = FORMATS[file.format].rows
     if what := not_text(file.head()):
@@ -307,7 +310,7 @@ def read(file: InputFile, options: Options) -> Iterator[EdgeColumns]:
 
 
 def _edges(block: RowPoses, line: int, fmt: Rows, options: Options) -> EdgeColumns:
-    """Return the poses of a block, of frames that move where they have stamps."""
+    """Return the poses of a block as edges; with stamps the frames move."""
     poses = [*map(tuple, block.numbers.tolist())]
     stamps = None if block.stamps_ns is None else block.stamps_ns.tolist()
     bare, usual = options.tally.names.bare, options.answers.names(*fmt.frames)

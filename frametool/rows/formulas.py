@@ -1,6 +1,6 @@
-"""Formulas of streams: what a camera says of the points of rows, and of the pixels of rows; poses by joint values.
+"""Formulas for streams: pixels of points, points or rays of pixels, and poses from joint values.
 
-Rows stay as they are.  Where a camera has no pixel, or no ray, there is no number: nan.
+Rows keep their columns.  A point without a pixel, or a pixel without a ray, gets nan.
 """
 
 from __future__ import annotations
@@ -28,19 +28,19 @@ if TYPE_CHECKING:
 
 ALL, INSIDE, OUTSIDE, UNSIZED = "", "in the image", "outside it", "with a pixel"
 BEHIND, BEYOND, HORIZON = "behind the camera", "beyond the model", "above the horizon"
-UNKNOWN = 2.0  # in_image where the size of the picture is not known
+UNKNOWN = 2.0  # in_image if the size of the image is unknown
 TRUTHS, BITS = ("false", "true", "null"), ("0", "1", "")
 RAY = tuple(f"{part}_{axis}" for part in ("origin", "ray") for axis in "xyz")
-OWN = (0.0,) * 7  # a row stays as it is: its own pose is not replaced
+OWN = (0.0,) * 7  # a placeholder: the pose of the row is not replaced
 
 
 class Seen(Formula):
-    """What both ways share: rows stay, no frame changes, and what becomes of each is counted."""
+    """Base of both camera formulas: rows and frames are unchanged, and the outcomes are counted."""
 
     def __init__(self, camera: Camera, what: str, first: float) -> None:
         """Begin without rows.
 
-        what: a row is called; first: the centre of the first pixel, as pixels are written
+        what: the name of a row in messages; first: the coordinate of the centre of the first pixel
         """
         self.camera = camera
         self.what = what
@@ -49,16 +49,16 @@ class Seen(Formula):
 
     @property
     def lost(self) -> int:
-        """Count the rows without numbers."""
+        """Return the number of rows without numbers."""
         return self.counts[BEHIND] + self.counts[BEYOND] + self.counts[HORIZON]
 
     @property
     def is_mostly_behind(self) -> bool:
-        """Return True if the camera may look another way than it was taken to."""
+        """Return True if most points are behind the camera, so that its axes may be assumed wrongly."""
         return 2 * self.counts[BEHIND] > self.counts[ALL] >= 3
 
     def summary(self) -> str:
-        """Return how many rows there were, and what became of them; "" where all have what they should."""
+        """Return the number of rows and of each outcome, for a message; "" if there is no outcome to report."""
         angle = f" ({degrees(self.camera.end_angle):.1f} deg)"
         parts = [
             f"{self.counts[name]} {name}{angle * (name == BEYOND)}"
@@ -70,12 +70,15 @@ class Seen(Formula):
 
 
 class PixelsOfPoints(Seen):
-    """The pixel and the depth of each point, whether it is in the image, and its distance if that is wanted."""
+    """The pixel and the depth of each point, whether it is in the image, and optionally its distance."""
 
     def __init__(
         self, camera: Camera, first: float, *, name: str, ranged: bool, take: Callable[..., None] | None = None
     ) -> None:
-        """Take the camera and its name, if any; take: is given the pixels and depths, and which are in the image."""
+        """Store the camera and its name, "" for none; ranged: add the distance.
+
+        take: called with the pixels, the depths, and the mask of pixels in the image
+        """
         super().__init__(camera, "point", first)
         self.names = ("u", "v", "depth", "in_image", *["range"] * ranged)
         self.take = take
@@ -84,7 +87,7 @@ class PixelsOfPoints(Seen):
         self.shown = Shown({3: BITS}, members | dict.fromkeys(self.names[4:], (4,)))
 
     def extras(self, row: str) -> tuple[str, ...]:
-        """Name the numbers; raise ValueInvalid for what is at no place."""
+        """Name the numbers; raises ValueInvalid for rows without a position."""
         if row not in (POINT, POSE):
             raise ValueInvalid(f"a {row} has no pixel; points and poses have one")
         return self.names
@@ -98,7 +101,7 @@ class PixelsOfPoints(Seen):
         sized = self.camera.size is not None
         inside = self.camera.is_in_image(u, v) if sized else _is_known(u)
         code = 1.0 * inside if sized else UNKNOWN + 0.0 * depth
-        # rows that have none are bad and count elsewhere
+        # bad rows are nan and counted elsewhere
         seen, there, within = _number(_is_known(u)), _number(_is_known(depth)), _number(inside)
         behind = _number(self.camera.is_behind(depth) & (u != u))  # noqa: PLR0124 - nan
         self.counts.update({ALL: there, BEHIND: behind, BEYOND: there - seen - behind})
@@ -110,12 +113,12 @@ class PixelsOfPoints(Seen):
 
 
 class PointsOfPixels(Seen):
-    """What pixels see: a ray from the camera, a point on it, or the pixel of another picture.
+    """A ray or a point for each pixel, or the pixel of another camera.
 
-    columns: of u and v, then of how far away it is
-    far: depth or range, and its value if that is one for all; "" where it is not known
-    height: of the plane that rays meet, in the frame of the second pose that rows are given; None for no plane
-    into: the camera of the other picture
+    columns: of u and v, then of the depth or range
+    far: "depth" or "range" and its value, if constant; "" if unknown
+    height: of the plane to intersect, in the frame of the second pose that is passed; None without a plane
+    into: the other camera
     """
 
     reads_row = False
@@ -124,7 +127,7 @@ class PointsOfPixels(Seen):
         self, camera: Camera, first: float, columns: Sequence[str], *, far: tuple[str, float | None] = ("", None),
         height: float | None = None, into: Camera | None = None, target: str = "",
     ) -> None:  # fmt: skip
-        """Take what pixels are made of; target: the frame that the numbers are in, if it has a name."""
+        """Store the camera and what to compute; target: the frame of the results, "" without a name."""
         super().__init__(camera, "pixel", first)
         self.columns = tuple(columns)
         self.far, self.constant = far
@@ -148,7 +151,7 @@ class PointsOfPixels(Seen):
     def result(
         self, row: str, parts: Components, cells: Sequence[Number], times_ns: Number, xp: Namespace  # noqa: ARG002
     ) -> Components:
-        """Return the numbers of pixels; parts: the poses of the camera and of the plane."""
+        """Return the results for pixels; parts: the pose of the camera, then that of the plane."""
         u, v = (each - self.first for each in cells[:2])
         poses: Any = parts
         pose: Rigid = poses[:7]
@@ -180,7 +183,7 @@ def _is_known(number: Number) -> Any:
 
 
 def _number(flag: Any) -> int:
-    """Count the rows of a block that are something, or the one."""
+    """Return the number of True flags of a block, or 1 or 0 for a single one."""
     return int(flag if isinstance(flag, bool) else flag.sum())
 
 
@@ -188,18 +191,15 @@ def _number(flag: Any) -> int:
 
 
 class JointRows(Formula):
-    """The pose of a robot's frame for each row.
-
-    base, tip: the pose is that of tip in base
-    """
+    """The pose of tip in base, two frames of a robot, for each row of joint values."""
 
     reads_row = False
     adds = False
 
     def __init__(self, robot: Robot, posture: JointState, base: str, tip: str) -> None:
-        """Find the way; the joints that the posture sets need no column.
+        """Find the chain of joints; those with a value in the posture need no column.
 
-        Raises UnknownFrame, NotConnected; BadAnswer for joints that are set to move over time.
+        Raises UnknownFrame, NotConnected; BadAnswer for joints whose value changes over time.
         """
         self.chain = robot.chain(base, tip)
         self.joints = robot.joints
@@ -212,10 +212,10 @@ class JointRows(Formula):
         self._beyond: set[str] = set()
 
     def bind(self, names: Sequence[str], source: str, *, fixed: frozenset[str] = frozenset()) -> None:
-        """Choose the columns of the joints on the way.
+        """Choose the columns of the joints of the chain.
 
-        fixed: the joints that nothing but `constants` may tell.
-        Raises Misused for a joint that has none or several, FormatError for a unit it cannot have.
+        fixed: the joints whose value must come from `constants`
+        Raises Misused for a joint without a column or with two values, FormatError for an invalid unit.
         """
         from frametool.formats.robots.joints import find_joint_columns
 
@@ -237,17 +237,17 @@ class JointRows(Formula):
         self.columns = tuple(names[column.place] for column in columns)
 
     def kind(self, row: str) -> str:  # noqa: ARG002 - whatever a row is
-        """Return that rows get a pose."""
+        """Return POSE."""
         return POSE
 
     def rename(self, row: str, parent: str | None, name: str | None) -> tuple[str | None, str | None]:  # noqa: ARG002
-        """Return the frames of the pose."""
+        """Return base and tip."""
         return self.base, self.tip
 
     def result(
         self, row: str, parts: Components, cells: Sequence[Number], times_ns: Number, xp: Namespace  # noqa: ARG002
     ) -> Components:
-        """Return the pose for the cells of a block, or of one row."""
+        """Return the pose for the joint values of a block, or of one row."""
         from frametool.formats.robots.joints import SLACK
         from frametool.formats.robots.model import TURNING, JointValue
 
@@ -266,10 +266,10 @@ class JointRows(Formula):
 
 
 def names_in(begin: bytes, fmt: str, source: str, wanted: str, *, header: bool = True) -> Sequence[str]:
-    """Return the names of a table's columns, or the keys of the first record; of a JointState the joints it names.
+    """Return the names of a table's columns, or the keys of the first record; of a JointState its joints.
 
-    begin: the first bytes of the stream, of one of the formats that are streamed; wanted: what a record has
-    Columns without names are called by their numbers from 1; keys within a mapping have its key and a dot before them.
+    begin: the first bytes of the stream; wanted: what a record must have, for messages
+    Columns without names are numbered from 1; keys in a mapping are joined to its key by a dot.
     """
     if "records" not in FORMATS[fmt].reads:
         from frametool.rows.sources.tables import open_table
@@ -291,7 +291,7 @@ def names_in(begin: bytes, fmt: str, source: str, wanted: str, *, header: bool =
 
 
 def _flat_keys(value: dict[str, Any], prefix: str = "") -> list[str]:
-    """Return the keys of what is neither mapping nor empty, in order."""
+    """Return the keys of all values that are no mappings, in order."""
     found: list[str] = []
     for key, each in value.items():
         found += _flat_keys(each, f"{prefix}{key}.") if type(each) is dict else [prefix + key]

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 POINT_KEYS = {"point": 1.0, "vector": 1.0, **POSITION_KEYS}  # metres per unit
 INNER = ("transforms", "static_transforms", "poses", "pose", "transform", "twist", "wrench", "accel", "msg", "message",
          "detections")  # fmt: skip
-LISTS = ("markers", "polygon", "points")  # of messages with nothing else in them
+LISTS = ("markers", "polygon", "points")  # keys of messages that hold nothing else
 COVARIANCES = ("covariance", "position_covariance", "orientation_covariance")
 # a mapping with no other keys may be the identity
 NOTHING_BUT = frozenset((*POSE_KEYS, *PARENT_KEYS, *NAME_KEYS)).difference(LISTED_WORDS)
@@ -54,8 +54,8 @@ OTHER_WORDS = dict.fromkeys(("q", "quats", "quaternions", "orient", "so3"), "qua
 class Members:
     """The keys of a mapping that are a position or a rotation, classified once for search and reading.
 
-    positions, rotations: the keys of each; say_pose: whether there are any
-    parts: the kind of two vectors that it has instead, such as a twist, or ""; lists: the keys of lists and mappings
+    positions, rotations: the keys of each; say_pose: there are some
+    parts: the kind if it holds a twist, wrench or acceleration, else ""; lists: the keys of lists and mappings
     """
 
     def __init__(self, value: dict[str, Any]) -> None:
@@ -67,7 +67,7 @@ class Members:
                 self.lists.add(key)
             if key in POINT_KEYS and is_position(key, each) and not (key == "point" and type(each) is str):
                 self.positions.append(key)
-            # the R of a CameraInfo rectifies pictures
+            # the R of a CameraInfo rectifies images
             if is_rotation(key, each) and not (key == "R" and ("K" in value or "P" in value)):
                 self.rotations.append(key)
         self.say_pose = bool(self.positions or self.rotations)
@@ -93,7 +93,7 @@ class Members:
         value, rotations = self.value, self.rotations
         scalars = [key for key in value if key not in self.lists]
         others = NOTHING_BUT.difference(RELATIVE) if "axis_x" in value else NOTHING_BUT
-        names = [key for key in scalars if key not in others]  # that may be numbers of a pose
+        names = [key for key in scalars if key not in others]  # possible numbers of a pose
         is_flat = not self.say_pose
         if not (names or (is_flat and len(scalars) >= 6)):
             return None
@@ -126,7 +126,7 @@ class Members:
         if not wanted or KNOWN.issuperset(self.value):
             return
         wanted -= LISTED_WORDS
-        # a number under one or two letters, as px and ry, is no misspelt list
+        # a number under one or two letters, such as px or ry, is no misspelt list
         near = []
         for key in islice(self.value, MOST_COMPARED):
             if key in KNOWN or not (key[2:] or type(self.value[key]) is not str):
@@ -139,7 +139,7 @@ class Members:
 
 
 class Holder(NamedTuple):
-    """The mapping or list with the numbers of a record; of a message also the field and its kind."""
+    """The mapping or list that holds the numbers of a record; in a message also the field and its kind."""
 
     path: Path
     field: str = ""
@@ -205,9 +205,9 @@ def _refuse(document: Any) -> None:
 
 
 def _search(value: Any, path: Path, request: Request, reading: Reading) -> list[Holder]:
-    """Return the holders below a value; if frames change, refuse a mapping that would move only in part.
+    """Return the holders below a value; if frames change, refuse a mapping that would be moved only in part.
 
-    A warning names velocities that are not moved with a point or pose.
+    Warns about velocities that are not moved with a point or pose.
     """
     if type(value) is list:
         is_matrix = len(value) in (3, 4) and all(type(row) is list for row in value)
@@ -218,7 +218,7 @@ def _search(value: Any, path: Path, request: Request, reading: Reading) -> list[
     if type(value) is not dict:
         return []
     operation, members = request.operation, Members(value)
-    holds: dict[str, str] = {}  # the fields of a known message and their kinds, and the fields that stay
+    holds: dict[str, str] = {}  # the fields of a known message and their kinds; `stays`: its unchanged fields
     stays: tuple[str, ...] = ()
     if "header" in value or "angular_velocity" in value:
         from frametool.ros.messages import HELD
@@ -315,7 +315,7 @@ def covariance_keys(field: str) -> Sequence[str]:
 
 
 def outdated(members: Mapping[str, Any]) -> set[str]:
-    """Return the keys that describe a pose as it was; a distance or an angle by itself is something else."""
+    """Return the keys that describe a pose before it changed; a distance or an angle alone is other data."""
     return {"gimbal_lock", *(RELATIVE if members.keys() >= {*RELATIVE} else ())}
 
 

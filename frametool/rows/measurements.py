@@ -1,10 +1,10 @@
-"""Measurements of frames in one another, and the files they are read from.
+"""Measurements of frames relative to one another, and the files they are read from.
 
     measurements: [{parent: base, child: lidar, xyz: [1, 0, 2], rpy_deg: [0, 0, 90], sigma: {xyz: 0.01, rpy_deg: 1}}]
-    parent,child,x,y,z,qx,qy,qz,qw,sigma_xyz,sigma_rpy_deg,id         one a row; pairs may repeat
-    {"parent": "base", "child": "lidar", "xyz": [1, 0, 2]}            one a line
+    parent,child,x,y,z,qx,qy,qz,qw,sigma_xyz,sigma_rpy_deg,id         one per row; pairs may repeat
+    {"parent": "base", "child": "lidar", "xyz": [1, 0, 2]}            one per line
 
-Whatever holds a tree is read too: each of its edges measures.  Poses are read as records and rows are anywhere.
+Any tree can be read, too: each of its edges is a measurement.  Poses are records or rows as everywhere.
 """
 
 from __future__ import annotations
@@ -48,12 +48,12 @@ CHILD = "child"
 OURS = frozenset((*KNOWN, *NAME_KEYS, *STAMP_KEYS, *INNER, CHILD, "id", "children", "samples", "header"))
 MISSPELT = ("parent", CHILD, *COVARIANCE_KEYS, "inverse", "angles")  # keys of measurements alone
 LIKE = "a measurement is {parent: .., child: .., xyz: [..], rpy_deg: [..]}"
-WRAPPED = rb'"(?:op|msg|message|topic|transforms?)"'  # of JSON that holds messages rather than rows
-MOVED = Operation(left=(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0))  # by nothing: so that covariances count
+WRAPPED = rb'"(?:op|msg|message|topic|transforms?)"'  # JSON with messages, not rows
+MOVED = Operation(left=(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0))  # the identity, so that covariances are read
 
 
 class MeasuredRow(NamedTuple):
-    """A measurement as read, its line, its time if it says one, and its column where that is known."""
+    """A measurement, its line, its stamp if it has one, and its column if known."""
 
     measurement: Measurement
     line: int
@@ -66,9 +66,9 @@ def read_measurements(
 ) -> list[Measurement]:
     """Read the measurements of files, in their order.
 
-    degrees: the unit of bare angles; normalize: take any non-zero quaternion and any matrix near a rotation
-    Raises FormatError with the place of what is no measurement: a frame that moves, or is measured from itself, an
-    exact one; a missing name or pose.
+    degrees: the unit of bare angles; normalize: accept any non-zero quaternion and any matrix near a rotation
+    Raises FormatError with the place of an invalid measurement: a moving frame, a frame in itself, a sigma of 0, a
+    missing name or pose.
     """
     request = Request(rows=RowOptions(kind=POSE, degrees=degrees, normalize=normalize))
     found: list[Measurement] = []
@@ -139,9 +139,9 @@ def _measurement(argument: Any, place: str) -> Measurement:
 
 
 def without(measurements: Sequence[Measurement], places: Sequence[str]) -> list[Measurement]:
-    """Return the measurements but those that are at some places, FILE:LINE.
+    """Return the measurements except those at some places, FILE:LINE.
 
-    Raises ValueInvalid for a place where none is, or several.
+    Raises ValueInvalid for a place without a measurement, or with several.
     """
     many = Counter(each.place for each in measurements)
     if unknown := next((place for place in places if place not in many), ""):
@@ -152,7 +152,7 @@ def without(measurements: Sequence[Measurement], places: Sequence[str]) -> list[
 
 
 def _problem(row: MeasuredRow, first: dict[tuple[str, str], MeasuredRow]) -> str:
-    """Return what is wrong with a measurement; first: of each pair the first one that says a time."""
+    """Return the error in a measurement, "" for none; first: for each pair its first measurement with a stamp."""
     parent, child, components, covariance = row.measurement[:4]
     if missing := [key for key, name in (("parent", parent), (CHILD, child)) if not name]:
         return f"missing {' and '.join(missing)}; {LIKE}"
@@ -170,7 +170,7 @@ def _problem(row: MeasuredRow, first: dict[tuple[str, str], MeasuredRow]) -> str
 
 
 def _of_edges(file: FrameFile, request: Request) -> Iterator[MeasuredRow]:
-    """Yield the edges of a file that holds a tree; what recordings say again at one time they say once."""
+    """Yield the edges of a file that holds a tree; repeated messages of a recording count once."""
     edges = [edge for edge in file.edges(normalize=request.rows.normalize) if edge.parent is not None]
     lines = lines_of([EdgePlace(file, edge) for edge in edges])
     said = {edge[:4] if edge.stamp_ns is not None else at: at for at, edge in reversed([*enumerate(edges)])}
@@ -261,7 +261,7 @@ def _rows(value: Any, path: Path, reading: Reading) -> Iterator[tuple[Path, Any]
 
 
 def _of_row(row: Any, path: Path, request: Request, reading: Reading) -> Iterator[tuple[Record, Measurement]]:
-    """Yield what one row of a document measures: one pose, or those of the transforms of a message."""
+    """Yield the measurements in one row of a document: one pose, or those of the transforms of a message."""
     if type(row) is not dict:
         raise Misfit(f"expected a measurement, found {kind(row)}; {LIKE}", path)
     if OURS.isdisjoint(row):
@@ -286,7 +286,7 @@ def _of_row(row: Any, path: Path, request: Request, reading: Reading) -> Iterato
 
 
 def _one_child(child: Any, name: str | None) -> str:
-    """Return the name of the frame that is measured, under either key; raises Misfit where they differ."""
+    """Return the name of the measured frame, from either key; raises Misfit if they differ."""
     if child is not None and (type(child) not in (str, Verbatim) or not child):
         raise Misfit(f"child must be a frame's name, found {kind(child)}", (CHILD,))
     if child and name and child != name:
@@ -297,7 +297,7 @@ def _one_child(child: Any, name: str | None) -> str:
 def _made(
     pose: Pose, shape: Shape, own: Sequence[float], bare: Callable[[str], str], child: str, label: str | None
 ) -> Measurement:
-    """Return what a pose measures, with the angles that its rotation was written in, if these are its own."""
+    """Return the measurement of a pose, with its angles as written unless the pose was inverted."""
     name = shape.notation.representation.name if shape.notation and not shape.inverse else ""
     written: tuple[str, tuple[float, float, float]] | None = None
     if name in ("rpy", "rotvec"):

@@ -1,9 +1,9 @@
-"""What hand-eye and matched points are solved from: pairs of poses, and points with their ids and weights.
+"""Read the input of hand-eye calibration and of point matching: pairs of poses, and points with ids and weights.
 
-- {gripper: {xyz: [..], rpy: [..]}, target: {..}}                      samples as one writes them
+- {gripper: {xyz: [..], rpy: [..]}, target: {..}}                      samples of frametool
 - {effector_wrt_world: [16 numbers], object_wrt_sensor: [..]}          of moveit_calibration
 samples: [{robot: {translation: .., rotation: ..}, tracking: {..}}]    of easy_handeye2 (`optical` in the first)
-id,x,y,z,weight                                                        points, in any format that holds such
+id,x,y,z,weight                                                        points, in any format that can hold them
 """
 
 from __future__ import annotations
@@ -54,9 +54,9 @@ NEAR_NS = 50_000_000  # maximum between stamps of a gripper and a target that ar
 class HandEyeSamples(NamedTuple):
     """Pairs of poses: base_from_gripper and camera_from_target, (n,) each.
 
-    places: where each is; names: of base, gripper, camera and target, None where nothing says one
-    files: what they are called; taken: how a format's own words were taken
-    placed: whether they have positions; else these are 0
+    places: of each pair, for messages; names: of base, gripper, camera and target, None if unknown
+    files: their names; taken: how ambiguous keys of the format were interpreted
+    placed: the poses have positions; else these are 0
     """
 
     gripper: Transform
@@ -71,10 +71,10 @@ class HandEyeSamples(NamedTuple):
 def read_samples(
     argument: str, *, eye_to_hand: bool, normalize: bool = False, fmt: str = "", columns: Sequence[str] = ()
 ) -> HandEyeSamples:
-    """Read one file of samples: as one writes them, of moveit_calibration, of easy_handeye2, or a table of both poses.
+    """Read samples from one file: frametool's own, of moveit_calibration, of easy_handeye2, or a table with both poses.
 
-    eye_to_hand: easy_handeye has gripper_from_base as `robot` then; it is inverted.
-    columns: of a table, those of the gripper and those of the target; else they begin with these words
+    eye_to_hand: `robot` of easy_handeye is then gripper_from_base, and is inverted
+    columns: of a table, those of the gripper and those of the target; by default those that begin with these words
     Raises FormatError with the place.
     """
     file = InputFile(argument)
@@ -119,7 +119,7 @@ def read_samples(
 
 
 def _of_table(file: InputFile, fmt: str, columns: Sequence[str], *, normalize: bool) -> HandEyeSamples:
-    """Read the poses of gripper and target that are side by side in the rows of a table."""
+    """Read the poses of gripper and target from the rows of a table."""
     text = file.stream.read()
     names = open_table(text, fmt, header=True, source=file.name)[0].names or ()
     for first, others in () if columns else PARTNERS.items():
@@ -195,7 +195,7 @@ def _sample(value: Any, path: Path, reading: Reading, *, eye_to_hand: bool) -> t
 
 
 def _pose(value: Any, path: Path, reading: Reading) -> Pose:
-    """Read a record that is a pose, or the 16 numbers of a matrix; it has a rotation."""
+    """Read a pose with a rotation from a record, or from the 16 numbers of a matrix."""
     if type(value) is list and len(value) == 16:
         value = [value[at : at + 4] for at in range(0, 16, 4)]
     request = Request(rows=RowOptions(kind=POSE, normalize=reading.normalize))
@@ -210,9 +210,10 @@ def _pose(value: Any, path: Path, reading: Reading) -> Pose:
 
 
 class Points(NamedTuple):
-    """Points of a file, (n, 3), metres.
+    """The points of a file, (n, 3), in metres.
 
-    ids, weights: of each, None where the file has none; places: where each is; frame: the one they are expressed in
+    ids, weights: of each point, None if the file has none; places: of each point, for messages
+    frame: the frame that all are expressed in; None if unknown or if there are several
     """
 
     file: str
@@ -224,7 +225,7 @@ class Points(NamedTuple):
 
 
 def read_points(argument: str, *, fmt: str, answers: Answers, policy: Callable[[str], BadRows]) -> Points:
-    """Read the points of a file in any format that holds such, with what is called `id` or `name`, and `weight`.
+    """Read the points of a file in any format that can hold them, with the columns `id` or `name`, and `weight`.
 
     Raises FormatError with the place.
     """
@@ -239,7 +240,7 @@ def read_points(argument: str, *, fmt: str, answers: Answers, policy: Callable[[
     row = " row " if "arrays" in FORMATS[fmt].reads else ":"
     places = [f"{file.name}{row}{line}" for line in rows.lines.tolist()]
     extras = {key: plain_cells(cells) for key, cells in rows.extras.items()}
-    if len({*rows.names}) > 1:  # one that all have tells none from the others
+    if len({*rows.names}) > 1:  # a name that all share identifies no point
         extras["name"] = [*rows.names]
     key = next((key for key in IDS if any(each is not None for each in extras.get(key, ()))), "")
     first: dict[str, str] = {}
@@ -262,9 +263,9 @@ def read_points(argument: str, *, fmt: str, answers: Answers, policy: Callable[[
 
 
 class Matched(NamedTuple):
-    """Points of two files that belong together, (n, 3) each.
+    """The points of two files with the same id or row, (n, 3) each.
 
-    places, ids: of each in the first file
+    places, ids: of the points in the first file
     """
 
     target: Array
@@ -275,9 +276,9 @@ class Matched(NamedTuple):
 
 
 def matched(a: Points, b: Points) -> Matched:
-    """Match points by their ids, or row by row where one file has none; warn of what has no partner.
+    """Match points by their ids, or by row if one file has none; warn about points without a partner.
 
-    Raises ValueInvalid where nothing matches.
+    Raises ValueInvalid if nothing matches.
     """
     if a.ids is not None and b.ids is not None:
         of_b = {name: at for at, name in enumerate(b.ids)}

@@ -41,7 +41,7 @@ if TYPE_CHECKING:
 
 SAME = 1e-12  # metres, for positions of about a metre, and radians: the rounding of composing and writing numbers
 STATIC = "tf_static"
-TRANSFORMS = ("tf", STATIC)  # how topics of transforms are called, in any namespace
+TRANSFORMS = ("tf", STATIC)  # last part of the names of topics of transforms
 MOST_NAMED = 8  # edges
 MOVED_TYPES = POSES | {"geometry_msgs/msg/PointStamped", POSE_ARRAY}
 MOVES = ", ".join(sorted(name.rpartition("/")[2] for name in MOVED_TYPES))
@@ -50,7 +50,7 @@ TF_STATIC = KINDS["tf_static"]
 
 @dataclass(slots=True)
 class RecordedEdge:
-    """The data of one frame in a recording: its first values, its parents, its topics, and whether others follow."""
+    """The edges of one frame in a recording: first values, parents, topics, and True if other values follow."""
 
     numbers: Rigid
     parents: dict[str, None] = field(default_factory=dict)
@@ -68,22 +68,22 @@ def is_same(a: Rigid, b: Rigid) -> bool:
 
 
 def put(part: Any, numbers: Iterable[float]) -> None:
-    """Write numbers to x, y, z and w of a part of a message; none is -0.0."""
+    """Write numbers to x, y, z and w of a part of a message, without -0.0."""
     for name, number in zip("xyzw", numbers, strict=False):
         setattr(part, name, number + 0.0)
 
 
 @dataclass
 class RecordRun:
-    """One copy of a recording: `pieces` are its bytes, `summary` says what was done.
+    """One copy of a recording: `pieces` yields its bytes, `summary` what was changed.
 
-    Messages are bytes, and everything that is not changed is preserved.  No messages are kept in memory.
+    Messages are copied as bytes, and everything else is preserved.  No messages are kept in memory.
 
-    bad: what is done with messages that cannot be moved
+    bad: reports messages that cannot be moved
     tree: its edges are added; replace: they replace edges with other values
     into: the frame that messages are moved into; topics: of these messages, and of the transforms that are used
     window: the first and the last log time that is copied
-    normalize: take any non-zero quaternion
+    normalize: accept any non-zero quaternion
     """
 
     reader: RecordingReader
@@ -98,18 +98,18 @@ class RecordRun:
     def __post_init__(self) -> None:
         """Read the transforms that are needed, and check that the recording can be changed as requested.
 
-        Raises FormatError for a topic that is not there or cannot be moved, Misused where none is to be moved,
-        BadTopology for edges that do not fit, LookupFailed for a frame that is not there.
+        Raises FormatError for a topic that is missing or cannot be moved, Misused if no topic can be moved.  Raises
+        BadTopology for edges that contradict the recording, LookupFailed for an unknown frame.
         """
         self.names = Names()
         self.known: dict[str, RecordedEdge] = {}  # the edges of the recording, by child
-        self.topic_of: dict[str, str] = {}  # of all its frames
-        self.added: dict[str, list[Edge]] = {}  # the edges that it lacks, by topic
-        self.same: list[Edge] = []  # those with the same values there
-        self.replaced: dict[str, Edge] = {}  # those with others, by child
-        self.moved = Counter[str]()  # how many messages of a topic were looked at
-        self.tally = Diagnostics()  # of these: names with a leading slash, and quaternions that are not unit
-        self.undefined: dict[str, set[str]] = {}  # types that it does not define, by what became of them
+        self.topic_of: dict[str, str] = {}  # a topic of each frame
+        self.added: dict[str, list[Edge]] = {}  # missing edges, by topic
+        self.same: list[Edge] = []  # edges that exist with the same values
+        self.replaced: dict[str, Edge] = {}  # edges with other values, by child
+        self.moved = Counter[str]()  # number of messages read, by topic
+        self.tally = Diagnostics()  # names with a leading slash, and quaternions that are not unit
+        self.undefined: dict[str, set[str]] = {}  # types without a definition, by how they are written
         self.copied = self.unmoved = self.rewritten = self.outside = 0
         of_transforms = {topic for topic in self.topics if topic.rpartition("/")[2] in TRANSFORMS}
         self.used = self.reader.on_topics(TYPES, of_transforms)  # channels whose transforms are used
@@ -124,7 +124,7 @@ class RecordRun:
     def _chosen(self, of_transforms: set[str]) -> list[Channel]:
         """Return the channels that are moved.
 
-        Raises FormatError for a topic that is not there or is not read, Misused where none is to be moved.
+        Raises FormatError for a topic that is missing or cannot be read, Misused if no topic can be moved.
         """
         chosen: list[Channel] = []
         channels, path = self.reader.all, self.reader.path
@@ -142,7 +142,7 @@ class RecordRun:
             remedy = f"--topic {first_of(movable, MOST_NAMED, gap='|')}" if movable else f"none of them is {MOVES}"
             raise errors.Misused(f"--into moves the messages of topics that are named; {remedy}", source=path)
         for each in channels if self.tree is not None or self.into else ():
-            is_like_ours = each.type.replace(".", "/").rpartition("/")[2].startswith("FrameTransform")  # as protobuf's
+            is_like_ours = each.type.replace(".", "/").rpartition("/")[2].startswith("FrameTransform")  # protobuf
             if each not in self.reader.channels and (is_like_ours or each.encoding == "ros1"):
                 what = f"{each.topic} holds {each.type} in {each.encoding}, which is only copied, not read"
                 raise FormatError(what, source=path)
@@ -199,7 +199,7 @@ class RecordRun:
         """
         above = {child: str(edge.parent) for child, edge in added.items()}
         everywhere = {child: [*edge.parents][-1] for child, edge in self.known.items()} | above
-        connected = {to_root(frame, above.get)[-1] for frame in self.topic_of}  # the roots of what is added to them
+        connected = {to_root(frame, above.get)[-1] for frame in self.topic_of}  # roots above its frames
         apart = set[str]()
         for child, edge in added.items():
             to_root(child, everywhere.get)  # raises for a frame below itself
@@ -212,7 +212,7 @@ class RecordRun:
             warn(f"{self.reader.path}: frame {shown(root)} is in none of its transforms{near}")
 
     def _as_copied(self, topics: set[str]) -> Frames:
-        """Return the transforms of the copy: those on some topics, or on all, and those that are added or replaced."""
+        """Return the transforms of the copy: those on some topics, or on all, with the added and replaced edges."""
         more = [*chain.from_iterable(self.added.values()), *self.replaced.values()]
         children = {edge.child for edge in more}
         if not more and not self.used:
@@ -301,7 +301,7 @@ class RecordRun:
         return self.reader.types.write(channel, message) if is_new else data
 
     def _in_frame(self, channel: Channel, data: bytes) -> bytes | None:
-        """Return a message in the chosen frame, the same object if it is in it; None for one that cannot be moved."""
+        """Return a message in the chosen frame, the same object if it already is; None if it cannot be moved."""
         self.moved[channel.topic] += 1
         stamp = ""
         try:
@@ -357,7 +357,7 @@ class RecordRun:
                 part.pose.covariance = np.array(uncertainty.rotate_covariance(entries, *mover[3:])) + 0.0
 
     def summary(self) -> Iterator[str]:
-        """Yield a sentence for each thing that was done or not needed."""
+        """Yield a sentence for each change, and for each edge that needed none."""
         for topic, edges in self.added.items():
             yield f"added on {topic}: {_listed(edges)}"
         if self.replaced:

@@ -1,4 +1,4 @@
-"""Poses of a whole stream gathered in arrays, for what needs all of them at once: trajectories, points, means."""
+"""Gather the poses of a whole stream in arrays, for what needs all of them at once: trajectories, points, means."""
 
 from __future__ import annotations
 
@@ -39,14 +39,14 @@ if TYPE_CHECKING:
     from frametool.text.lines import ByteStream
     from frametool.text.spans import Ints
 
-POSITION = 3  # numbers
+POSITION = 3  # numbers of a position
 
 
 def posed(outcomes: Iterable[Outcome], source: str, *, timed: bool = True) -> Iterator[Step]:
     """Yield the results of records as poses or points with their lines, block by block.
 
-    timed: stamps count; either all have one, or none
-    Raises FormatError for anything else than poses and points.
+    timed: either all results need a stamp, or none
+    Raises FormatError for other results.
     """
     for outcome in outcomes:
         results: BlockResults = outcome.results or BlockResults((), [])  # type: ignore[assignment]
@@ -58,9 +58,9 @@ def posed(outcomes: Iterable[Outcome], source: str, *, timed: bool = True) -> It
 
 
 class Gathered:
-    """The rows of a stream as poses (n, 7), in metres and as unit quaternions; a part that is missing is nan.
+    """The rows of a stream as poses (n, 7), in metres and as unit quaternions; a missing part is nan.
 
-    keys: of other columns, those that are kept
+    keys: the other columns to keep
     """
 
     def __init__(self, keys: Sequence[str] = ()) -> None:
@@ -69,7 +69,7 @@ class Gathered:
         self.blocks: list[RowPoses] = []
 
     def of(self, steps: Iterable[Step]) -> Generator[Outcome]:
-        """Keep the rows of blocks, with their lines from 1; pass on what is reported about them."""
+        """Keep the rows of blocks, with lines from 1; yield the outcomes of the blocks."""
         line = 1
         for rows, outcome in steps:
             if len(rows.numbers):
@@ -82,7 +82,7 @@ class Gathered:
             yield outcome
 
     def rows(self, source: str) -> RowPoses:
-        """Return all rows as one block, with the columns that any has; raises FormatError if there are none."""
+        """Return all rows as one block, with the kept columns that exist; raises FormatError if there are none."""
         if not self.blocks:
             raise FormatError("no poses or points in it", source=source)
         stamps = [each.stamps_ns for each in self.blocks if each.stamps_ns is not None]
@@ -103,9 +103,9 @@ class Gathered:
 
 
 def gathered(steps: Iterable[Step], bad: BadRows, keys: Sequence[str] = ()) -> RowPoses:
-    """Return all results of a stream as one block with their lines from 1, and some of its other columns as values.
+    """Return all results of a stream as one block with lines from 1; keys: the other columns to keep, as plain values.
 
-    Bad rows go to `bad`.  Raises FormatError if no row is left.
+    bad: reports the bad rows.  Raises FormatError if no row is left.
     """
     found = Gathered(keys)
     run(found.of(steps), lambda _: None, bad)
@@ -116,9 +116,9 @@ def samples_of(
     stream: ByteStream, fmt: str, asked: RowOptions, bad: BadRows, keys: Sequence[str] = (),
     answers: Answers = Answers(),  # noqa: B008 - it is frozen
 ) -> RowPoses:  # fmt: skip
-    """Return the poses or points of a stream in any format of records, of rows, or of columns of numbers.
+    """Return the poses or points of a stream in any format of records, rows, or columns of numbers.
 
-    asked: how they are read; keys: of other columns, those that are kept; otherwise as `gathered`
+    asked: how they are read; bad, keys: as for `gathered`
     """
     request = Request(rows=asked, on_error=bad.on_error)
     if "records" not in FORMATS[fmt].reads:
@@ -132,21 +132,21 @@ def steps_of(
     answers: Answers = Answers(),  # noqa: B008 - it is frozen
     *, header: bool = True, timed: bool = False,
 ) -> Iterator[Step]:  # fmt: skip
-    """Return what becomes of each block of a stream in any such format; timed: as for `posed`."""
+    """Yield the results of each block of a stream in such a format; timed: as for `posed`."""
     if "records" in FORMATS[fmt].reads:
         return posed(run_records(stream, fmt, request, source=source, style=style), source, timed=timed)
     return FormatConverter(fmt, request, source, style, answers).steps(stream, header=header)
 
 
 class MeanRows(Gathered):
-    """The rows of means, and the poses of arguments, with a weight or a label each, if a column or key holds such.
+    """The poses of streams and arguments to average, each with its weight or label if there are any.
 
-    extra: for each block the weights, or the numbers that `labels` has for the labels
-    place: names a line of the stream; named: the places of the poses of arguments
+    extra: for each block the weights, or the indices of the labels in `labels`
+    place: returns the place of a line of the stream; named: the places of the poses from arguments
     """
 
     def __init__(self, weights: str | None, by: str | None) -> None:
-        """Begin without rows; weights, by: the column or key of the weights, or of the labels."""
+        """Begin without rows; weights: the column or key of the weights, by: that of the labels."""
         super().__init__()
         self.key, self.by = by or weights, by
         self.uncertain = self.stamped = False
@@ -155,12 +155,12 @@ class MeanRows(Gathered):
         self.place: Callable[[int], str] = str
 
     def take(self, steps: Iterable[Step], place: Callable[[int], str]) -> Generator[Outcome]:
-        """Keep the rows of a stream; those without a weight are bad."""
+        """Keep the rows of a stream; a row without a weight is bad; place: returns the place of a line."""
         self.place = place
         return self.of(map(self._looked_at, steps))
 
     def add(self, source: Source, request: Request, *, name: str) -> list[Pose]:
-        """Add the poses of a text that is no stream, with what it is called; return them."""
+        """Add the poses of an argument and return them; name: of the argument, for messages."""
         poses = read_poses(source, request._replace(operation=COMBINED))
         self.named += [f"{name}, pose {at}" for at in range(1, len(poses) + 1)] if len(poses) > 1 else [name]
         results = BlockResults((), [*enumerate(map(Result, poses))])
@@ -170,7 +170,7 @@ class MeanRows(Gathered):
         return poses
 
     def _looked_at(self, step: Step) -> Step:
-        """Look at what comes with the rows of a block; those without a weight are bad."""
+        """Take the weights or labels of a block, and note covariances and stamps; rows without a weight are bad."""
         rows, outcome = step
         if not len(rows.numbers):
             return step
@@ -189,11 +189,11 @@ class MeanRows(Gathered):
         return rows, outcome._replace(faults=sorted([*outcome.faults, *faults]))
 
     def _values(self, rows: RowPoses, key: str) -> tuple[Any, dict[int, str]]:
-        """Return the weights or labels of rows, and why some have none."""
+        """Return the weights or labels of rows, and the reason for each row that has none."""
         cells: Any = rows.extras.get(key, rows.extras.get(f"column {key}"))
         if cells is None and key in NAME_KEYS + PARENT_COLUMNS:
             cells = objects(rows.for_each(rows.names if key in NAME_KEYS else rows.parents))
-        elif cells is None:  # that of a mapping: `detections.weight`
+        elif cells is None:  # a key in a mapping: `detections.weight`
             first, *steps = key.split(".")
             outer = plain_cells(rows.extras[first]) if first in rows.extras else [None] * len(rows.numbers)
             cells = objects(reduce(_below, steps or [key], each) for each in outer)
@@ -217,7 +217,7 @@ class MeanRows(Gathered):
         return numbers, reasons | {row: f"weight {numbers[row]:g} is negative" for row in negative}
 
     def groups(self, size: int) -> Iterator[tuple[str | None, Ints]]:
-        """Yield the rows of each label, by the first row that has it; without labels all that there are."""
+        """Yield each label with its rows, by the first row that has it; without labels None with all rows."""
         if self.by is None:
             yield None, np.arange(size)
             return
@@ -234,9 +234,9 @@ def _below(value: Any, key: str) -> Any:
 
 
 def means_of(rows: MeanRows, values: list[float] | None, *, robust: bool) -> Iterator[tuple[Result, list[str]]]:
-    """Yield the mean of all poses, or of those of each label, with its spread, and a message for each outlier.
+    """Yield the mean of all poses, or of each label, with its spread, and a message for each outlier.
 
-    values: the weights of poses that are arguments
+    values: the weights of poses from arguments
     """
     from frametool.fit.least_squares import length, off_text
     from frametool.fit.robust_mean import solve_mean
@@ -250,7 +250,7 @@ def means_of(rows: MeanRows, values: list[float] | None, *, robust: bool) -> Ite
     weights = np.concatenate(rows.extra) if by is None and rows.extra else values
     for label, at in rows.groups(len(poses)):
         frames, bodies = ({*(each if by is None else each[at])} for each in (parents, names))
-        frames = {each for each in frames if each is not None and not each.isdecimal()}  # which are no frames
+        frames = {each for each in frames if each is not None and not each.isdecimal()}  # a counter is no frame
         if len(frames) > 1 and not frames.issubset(EARTH_FRAMES):
             raise ValueInvalid(f"the poses are in {first_of(sorted(map(str, frames)), 3)}; use one frame for all")
         found = solve_mean(poses if by is None else poses[at], weights=weights, robust=robust)

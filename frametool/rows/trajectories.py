@@ -1,4 +1,4 @@
-"""Trajectories of any format as arrays: rows of poses or positions, files that list poses, what moves in a recording.
+"""Trajectories of any format as arrays: rows of poses or positions, files that list poses, moving frames of recordings.
 
 walk.tum        rows.csv        run.mcap:/odom        run.mcap:map:base_link
 
@@ -49,7 +49,7 @@ if TYPE_CHECKING:
 
     TrajectoryLike: TypeAlias = Trajectory | str | PathLike[str]
 
-WORDS = {  # what the settings of `compare` may be as text
+WORDS = {  # the text values of settings of `compare`
     "align": ("se3", "sim3", "yaw", "origin", "origin+scale", "none"), "mount": ("auto",), "like": ("evo",),
     "match": ("interpolate", "nearest"), "pairs_from": ("reference", "estimate"),
 }  # fmt: skip
@@ -66,11 +66,11 @@ def load_trajectory(
     frames: Sequence[str] = (),
     **answers: Any,
 ) -> Trajectory:
-    """Read a trajectory: a file of poses or positions over time, in any format that holds such.
+    """Read a trajectory: a file of poses or positions over time, in any format that can hold them.
 
-    path: a file, `-` for standard input, `FILE:TOPIC`, or `FILE:TARGET:SOURCE` for what moves in a tree or recording.
-    format, topic, frames, answers: as `frametool.load` has them.
-    Raises FormatError with the line of what cannot be read, ValueInvalid where there is not one trajectory.
+    path: a file, `-` for standard input, `FILE:TOPIC`, or `FILE:TARGET:SOURCE` for a frame of a tree or recording.
+    format, topic, frames, answers: as for `frametool.load`.
+    Raises FormatError with the line that cannot be read, ValueInvalid if there is not exactly one trajectory.
     """
     if format and format not in FORMATS:
         raise ValueInvalid(f"no trajectories are read from {format!r}{alternatives(format, FORMATS, 'formats')}")
@@ -87,10 +87,10 @@ def read_trajectory(
     policy: Callable[[str], BadRows] = BadRows,
     normalize: bool = False,
 ) -> Trajectory:
-    """Read what an argument names; otherwise as `load_trajectory`.
+    """Read the trajectory that an argument names; otherwise as `load_trajectory`.
 
-    policy: makes of a file's name what reports the rows that are none, and says whether they are skipped
-    normalize: take any non-zero quaternion and any matrix near a rotation
+    policy: returns the reporter of a file's bad rows, from the name of the file
+    normalize: accept any non-zero quaternion and any matrix near a rotation
     """
     name, inside = split_name(text)
     if len(inside) == 1:
@@ -113,15 +113,15 @@ def read_trajectory(
 
 
 def holds_tree(file: InputFile, fmt: str) -> bool:
-    """Return True for a file of edges rather than of records, of rows, or of columns of numbers."""
+    """Return True if a file holds edges, not records, rows or columns of numbers."""
     reads = FORMATS[fmt].reads
     return re.search(TREE, file.head()) is not None if "records" in reads else {"rows", "arrays"}.isdisjoint(reads)
 
 
 def split_name(text: str) -> tuple[str, list[str]]:
-    """Take FILE:TOPIC or FILE:TARGET:SOURCE apart; the file is the longest beginning that is one.
+    """Split FILE:TOPIC or FILE:TARGET:SOURCE; the file is the longest beginning that exists.
 
-    Names with a colon are in quotes.  Raises FileProblem.
+    Names with a colon must be quoted.  Raises FileProblem.
     """
     ends = [len(text), *(found.start() for found in reversed([*re.finditer(":", text)]))]
     end = next((end for end in ends if text[:end] == "-" or os.path.exists(text[:end])), None)
@@ -134,9 +134,9 @@ def split_name(text: str) -> tuple[str, list[str]]:
 
 
 def read_stamps(path: str, report: Report) -> list[int]:
-    """Return the stamps of a file in its order: times one a line, a table's, a trajectory's, a recording's (sorted).
+    """Return the stamps of a file in its order: one per line, or those of a table, trajectory or recording (sorted).
 
-    path: a file or a folder, or FILE:TOPIC; report: takes the errors of lines that are no time
+    path: a file or a folder, or FILE:TOPIC; report: called with the error of each invalid line
     """
     if path != "-" and not os.path.isfile(path) and (os.path.isdir(path) or ":" in path):
         name, topics = split_name(path)
@@ -153,7 +153,7 @@ def read_stamps(path: str, report: Report) -> list[int]:
                 reads, is_tree = FORMATS[fmt].reads, holds_tree(file, fmt)
                 return _stamps_of(path, fmt, is_tree="tree" in reads and (is_tree or "records" not in reads))
         titled = not is_list or stamp_column([words[0].decode("utf-8", "replace")]) is not None
-        named = ResultOptions(all_numbers=True, prefix=" ")  # as no column is
+        named = ResultOptions(all_numbers=True, prefix=" ")  # no column begins like this
         request = Request(Operation(left=IDENTITY), RowOptions(poses=0), named, on_error=SKIP)
         rows = TableRows(cast("ByteStream", file.stream), fmt, request, file.name, header=titled)
         if not rows.layout.times:
@@ -181,7 +181,7 @@ NO_TIMES = "no times in it; write one a line"
 
 
 def _stamps_of(path: str, fmt: str = "", topics: Sequence[str] = (), *, is_tree: bool = True) -> list[int]:
-    """Return the stamps of all that moves in a tree or recording, or of poses or records in their order."""
+    """Return the stamps of all moving frames of a tree or recording, sorted, or of poses or records in their order."""
     if is_tree:
         recording = FrameFile(path, fmt=fmt or None, topics=topics)
         found = sorted({edge.stamp_ns for edge in recording.edges() if edge.stamp_ns is not None})
@@ -197,7 +197,7 @@ def _stamps_of(path: str, fmt: str = "", topics: Sequence[str] = (), *, is_tree:
 def _of_samples(
     file: InputFile, fmt: str, answers: Answers, bad: BadRows, body: str, *, normalize: bool
 ) -> Trajectory:  # fmt: skip
-    """Gather records, rows or columns of numbers; body: the name of what moves, where records have none.
+    """Read records, rows or columns of numbers; body: the name of the moving frame, if records have none.
 
     Raises ValueInvalid for poses of several frames.
     """
@@ -225,7 +225,7 @@ def _of_tree(
     name: str, fmt: str, topics: Sequence[str], answers: Answers, frames: Sequence[str], file: InputFile | None = None,
     *, normalize: bool = False,
 ) -> Trajectory:
-    """Take the samples of a way through a tree that moves; of the only edge that does where none is named."""
+    """Sample the transform of SOURCE in TARGET in a tree; without names that of its only moving edge."""
     recording = FrameFile(name, None if file is None else file.stream, fmt or None, topics, answers)
     tree = cast("TransformBuffer", load_sources(opened_together([recording]), Rules(normalize=normalize)))
     if topics and not recording.topics.counts:
@@ -246,7 +246,7 @@ def _of_tree(
 
 
 class Alignment(NamedTuple):
-    """The estimate's world in the reference's, p' = scale R p + t; moved is the whole aligned estimate."""
+    """The estimate's world in the reference's, p' = scale R p + t; moved: the whole aligned estimate."""
 
     transform: Transform
     scale: float
@@ -318,7 +318,7 @@ def resample(
 
 
 def in_order(found: Trajectory, name: str) -> Trajectory:
-    """Sort a trajectory; warn of what that changes."""
+    """Sort a trajectory by its stamps; warn if that changes it."""
     for hint in found.disorder(name):
         warn(hint)
     return found.in_order()
