@@ -1,4 +1,4 @@
-"""Positions on the Earth in the grammar of poses: their keys, and the axes of rotations there.
+"""Positions on the Earth in the grammar of poses: their keys, and the local axes of rotations.
 
     {lat: 48.1, lon: 11.5, alt: 520}                             a point of `ecef`, WGS84; degrees, metres
     {lat: 48.1, lon: 11.5, axes: enu, rpy_deg: [0, 0, 90]}       a pose in `ecef`, its rotation relative to these axes
@@ -310,7 +310,7 @@ def _numbers_of(frame: str | None, position: Sequence[float], place: Place, read
 
 
 def _written(pose: Pose, place: Place) -> tuple[list[float], Pose]:
-    """Return the numbers of the position of a pose in ecef, and the pose without it, in the axes there.
+    """Return the numbers of the position of a pose in ecef, and the pose without it, in the local axes.
 
     Raises ValueInvalid as `_numbers_of`.
     """
@@ -322,7 +322,7 @@ def _written(pose: Pose, place: Place) -> tuple[list[float], Pose]:
 
 
 def placed_entry(pose: Pose, place: Place) -> tuple[dict[str, Any], Pose]:
-    """Return the position of a pose in ecef as a mapping, with the axes of its rotation; and the pose in these.
+    """Return the position of a pose in ecef as a mapping, with the axes of its rotation; and the pose in these axes.
 
     Raises ValueInvalid for a pose in another frame, and for a position that cannot be written in this notation.
     """
@@ -334,7 +334,7 @@ def placed_entry(pose: Pose, place: Place) -> tuple[dict[str, Any], Pose]:
 
 
 def placed_cells(pose: Pose, place: Place) -> tuple[dict[str, Any], Pose]:
-    """Return the position of a pose in ecef as cells of a table, with the axes of its rotation; and the pose there.
+    """Return the position of a pose in ecef as cells of a table, with the axes of its rotation; and the pose in these.
 
     Raises as `placed_entry`.
     """
@@ -348,7 +348,7 @@ def placed_cells(pose: Pose, place: Place) -> tuple[dict[str, Any], Pose]:
 
 
 def overview(pose: Pose) -> list[tuple[str, str]]:
-    """Return lines for people on a pose or point in ecef: lat lon alt, UTM, heading of its x; [] if it has none."""
+    """Return lines that describe a pose or point in ecef: lat lon alt, UTM, heading of its x; [] without a position."""
     x, y, z = pose.position or (0.0, 0.0, 0.0)
     lat, lon, alt = wgs84.lla(x, y, z, floats)
     if not isfinite(alt):
@@ -390,7 +390,7 @@ def frame_entry(pose: Pose, place: Place) -> tuple[dict[str, Any], Pose]:
 
 
 def seen_at(pose: Pose, place: Place | None) -> tuple[dict[str, Any], Pose]:
-    """Return a frame of ecef in one notation, and the axes of the remaining pose.
+    """Return the position of a frame of ecef as a mapping in one notation, and its pose in the axes stated there.
 
     If the notation cannot express the position, the mapping is empty and the pose unchanged.
     """

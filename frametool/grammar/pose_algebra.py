@@ -2,7 +2,7 @@
 
     map_from_tool = product(map_from_base, base_from_tool)
 
-A lookup has such a result too: the pose of SOURCE in TARGET as an entry of a tree, with its times.
+The result of a look-up is such a pose, too: SOURCE in TARGET, as an entry of a tree, with its times.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ def product(left: Pose, right: Pose) -> Pose:
 
 
 def shared_stamp(poses: Iterable[Pose]) -> dict[str, Any]:
-    """Return the common time of some poses, for their result; different times give none, with a warning."""
+    """Return the common stamp of some poses, for their result; empty if they differ, with a warning."""
     stamps = sorted({pose.stamp_ns for pose in poses if pose.stamp_ns is not None})
     if len(stamps) > 1:
         warn(f"the result has no stamp: {' and '.join(map(format_stamp, stamps[:2]))} are the times of two poses")
@@ -105,7 +105,7 @@ def result_at(
     components: Sequence[float], target: str | None, source: str | None, at_ns: int | None,
     entries: Iterable[float] | None = None,
 ) -> Result:  # fmt: skip
-    """Return target_from_source as a result; a time of None has no effect.  entries: of its covariance."""
+    """Return target_from_source as a result; at_ns: its stamp, None for none; entries: of its covariance."""
     extras: dict[str, Any] = {} if at_ns is None else {"stamp_ns": at_ns}
     if entries is not None:
         extras |= uncertain(entries)

@@ -48,7 +48,7 @@ _UNIT = r"_([nmuµ]?s)$|[\[(]\s*+((?:\s*+[^\[\]()\s]++)*+)\s*+[\])]$"
 _WHOLE_SECONDS = r"(|.*[._])(?:secs?|seconds)"
 _UNITS = {"ns": 1, "us": 10**3, "µs": 10**3, "ms": 10**6} | dict.fromkeys(("s", "sec", "seconds", ""), 0)
 _EARTH = r"(?:^|[^a-z])(?:lat(?:itude)?(?![a-z])|lla$|ecef|utm|easting|north|mgrs|at$)"
-# of places on the Earth, by keys and columns; names of other tools after ours
+# fields of positions on the Earth, by key or column, including names of other tools
 PLACE_FIELDS = {"lat": "lat", "latitude": "lat", "lon": "lon", "longitude": "lon", "lng": "lon", "long": "lon"}
 PLACE_FIELDS |= {"alt": "alt", "altitude": "alt", "height": "alt", "hae": "alt", "utm_zone": "zone"}
 PLACE_FIELDS |= dict.fromkeys(("msl", "ele", "elevation", "orthometric"), "msl")
@@ -169,7 +169,7 @@ def tell(source: Source, notes: list[Finding], most: int = 10) -> None:
 
 
 def alike(note: Finding) -> str:
-    """Return the common part of warnings that are emitted once, whatever the names and numbers in some are."""
+    """Return the key of a warning; of all warnings with the same key only the first is emitted."""
     return str(note.rule if note.rule in ("slash", "identity", "rounded") else note.message)
 
 
@@ -189,7 +189,7 @@ def slash_note(name: str) -> str:
 
 
 def within(path: Path, read: Callable[..., Any], *arguments: Any, **options: Any) -> Any:
-    """Call a reader of a nested value; its errors then have the whole path, those of values without a path this one."""
+    """Call a reader of a nested value; `path` is put before the path of its errors."""
     try:
         return read(*arguments, **options)
     except Misfit as misfit:

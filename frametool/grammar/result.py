@@ -204,7 +204,7 @@ def tree_entries(tree: Frames, style: Style) -> Iterator[dict[str, Any]]:
 
 
 def _edge(pose: Pose, style: Style, above: str | None = None) -> dict[str, Any]:
-    """Return an edge as a mapping: in the Earth's frame at its position, if positions are written like that.
+    """Return an edge as a mapping; in the Earth's frame with a geodetic position, if the style writes these.
 
     above: the parent of a sample that does not name it
     """

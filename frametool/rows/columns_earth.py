@@ -1,13 +1,13 @@
 """Positions on the Earth among the columns of a table or the keys of a record: lat lon alt, ecef_x, easting ..
 
-A common prefix is one that is set off (`field.latitude`, `gps_lat`); units follow names or in brackets.  Of records
-points of latitude and longitude stay where they are, anything else is read as a pose:
+A common prefix is separated from the name (`field.latitude`, `gps_lat`); units follow names or are in brackets.  In
+records lat, lon and alt of a point are replaced in place, all else is read as a pose or point in ECEF:
 
-    {"id": 7, "lat": 48.1, "lon": 11.5, "alt": 520}                     its numbers stay where they are, and are fast
-    {"utm": {..}}  {"at": {..}, "axes": "enu", ..}  {"lat": .., "heading_deg": 30, "axes": "ned"}     written anew
+    {"id": 7, "lat": 48.1, "lon": 11.5, "alt": 520}                     in place, and fast
+    {"utm": {..}}  {"at": {..}, "axes": "enu", ..}  {"lat": .., "heading_deg": 30, "axes": "ned"}     new members
     {"header": {"frame_id": "gps"}, "latitude": .., "position_covariance": [..]}                      a NavSatFix
 
-Loaded where one of the names may say such a position.
+Imported only if a key or column may hold such a position.
 """
 
 from __future__ import annotations
@@ -59,9 +59,9 @@ METRES = finder.Units("of a length here; known is m", {"": None, "m": None})
 
 
 def find_pose(header: Header, request: Request, source: str) -> PoseColumns | None:
-    """Find a position on the Earth and the rotation with it; None for rows that are expressed as x, y, z.
+    """Find a position on the Earth and its rotation among the columns; None for rows with x, y, z.
 
-    Raises ValueInvalid for half of one, for heights above the sea, and for several.
+    Raises ValueInvalid for an incomplete position, for heights above sea level, and for several positions.
     """
     groups: Groups = {
         key: {field: next(iter(found[field].values())) for field in found if field in FIELDS}
@@ -96,7 +96,7 @@ def find_pose(header: Header, request: Request, source: str) -> PoseColumns | No
 
 
 def _find(kind: str, header: Header, groups: Groups, key: tuple[str, str], earth: Earth) -> Columns | None:
-    """Return the columns of a position of one kind, if they are there.
+    """Return the columns of a position of one kind; None if they do not exist.
 
     Raises ValueInvalid for heights that are not above the ellipsoid, and for a missing zone.
     """
@@ -119,7 +119,7 @@ def _columns(
     kind: str, header: Header, fields: Mapping[str, Spot | None], spots: Mapping[str, Spot], earth: Earth,
     key: tuple[str, str] = finder.BARE,
 ) -> Columns:  # fmt: skip
-    """Put the columns of a position together, with that of the axes, and those that are checked and stay."""
+    """Return the columns of a position, with those of the axes, and those that are read but not rewritten."""
     grammar.refuse_not_read(spots)
     fields = {**fields, **{name: spots[name] for name in (AXES, *STAYING) if name in spots}}
     angles = [at for at, field in enumerate(fields) if field in ("lat", "lon")]
@@ -131,7 +131,7 @@ def _columns(
 
 
 def _check_found(found: Sequence[Columns], names: Sequence[str], fields: Collection[str], request: Request) -> None:
-    """Raise ValueInvalid for several positions, for none or half of one, and for a zone that has no effect."""
+    """Raise ValueInvalid for several positions, for a missing or incomplete one, and for a zone that has no effect."""
     expected, place = request.rows.given_place, place_of(found[0].unit) if found else None
     if len(found) > 1:
         several = "; ".join(each.shown for each in found)
@@ -153,10 +153,10 @@ def _check_found(found: Sequence[Columns], names: Sequence[str], fields: Collect
 
 
 def chosen_pose(spec: str, names: Sequence[str] | None, width: int, request: Request, _: str) -> PoseColumns:
-    """Take the columns that --columns names for a place, as --from says, and a rotation behind it.
+    """Return the columns in --columns as a position of the kind in --from, followed by a rotation if there are more.
 
-    spec: "" for all columns of a table without names, behind a stamp or not
-    Raises Misused for names that are not there, or a count that the place does not have.
+    spec: "" for all columns of a table without names, perhaps after a stamp
+    Raises Misused for names that do not exist, or a number of columns that does not fit.
     """
     kind, earth = request.rows.given_place, request.earth or Earth()
     fields = POSITIONS[kind].names[kind == UTM and earth.zone is not None :]
@@ -177,9 +177,9 @@ def chosen_pose(spec: str, names: Sequence[str] | None, width: int, request: Req
 def along(
     place: Place, shape: Shape, names: Sequence[str], places: tuple[int, ...]
 ) -> tuple[tuple[int, ...], Shape]:
-    """Return what the covariance with a place is expressed in; that of a NavSatFix is, where nothing else is there.
+    """Return the columns of the covariance of a position, and the shape with its axes; those of a NavSatFix by default.
 
-    Raises ValueInvalid where neither a row nor an option states it.
+    Raises ValueInvalid if neither rows nor options state the axes.
     """
     fix = {int(match[1]): at for at, name in enumerate(names) if (match := FIX_ENTRY.fullmatch(name))}
     if not places and shape.kind == POINT and len(fix) == 9:  # field.position_covariance0, or [0]
@@ -190,9 +190,9 @@ def along(
 
 
 def readers_of(shape: Shape) -> tuple[dict[int, Reader], dict[int, Reader], int]:
-    """Return what reads the words of a place, by the number's place, and what its angles with marks.
+    """Return the readers of words of a geodetic position and of angles with marks, both by index of the number.
 
-    And how many of the last numbers are read and stay as they are.
+    The third value is the number of last numbers that are read and not rewritten.
     """
     fields = shape.place.fields if shape.place is not None else ()
     words = {at: WORDS[field] for at, field in enumerate(fields) if field in WORDS}
@@ -225,14 +225,14 @@ WORDS: dict[str, Reader] = {ZONE: zone_number, AXES: _axes, STATUS: _status, PAR
 
 
 def zone_notes(place: Place, columns: Sequence[Floats], line_of: Callable[[int], int]) -> list[RowNote]:
-    """Return the zone of the first of some results in UTM, and where the first other one begins."""
+    """Return the zone of the first result in UTM, and that of the first one in another zone."""
     zones = [columns[at] for at in place.words]
     firsts = [(each, row) for each in zones for row in (0, *(each != each[0]).nonzero()[0][:1].tolist())]
     return [RowNote(line_of(row), ZONES, ZONE_NAMES[int(each[row])]) for each, row in firsts]
 
 
 def doubt_band(place: Place, columns: Sequence[Floats], line_of: Callable[[int], int]) -> list[RowNote]:
-    """Wonder about the first row whose zone has the S of a band."""
+    """Return a warning about the first row whose zone may have the S of a latitude band."""
     fields = dict(zip(place.fields, columns, strict=False))
     if place.name != UTM:
         return []
@@ -245,7 +245,7 @@ def doubt_band(place: Place, columns: Sequence[Floats], line_of: Callable[[int],
 def settle(
     request: Request, shapes: tuple[Shape, ...], table: Table, *, on_earth: bool
 ) -> tuple[Request, tuple[Shape, ...]]:
-    """Check what rows on the Earth need: axes for rotations, a height; and that the frame of places is the Earth's.
+    """Check that geodetic rows state axes for rotations and a height, and that results are in the Earth's frame.
 
     Raises ValueInvalid for a rotation without stated axes.
     """
@@ -267,7 +267,7 @@ def settle(
                 raise Misused("--local-axes has no effect: the rows have no rotation")
         elif shape.notation is None or not (place.axes or AXES in place.fields):
             raise ValueInvalid(UNSAID)
-        else:  # a heading is one in the axes there
+        else:  # a heading is relative to the axes at the position
             level = shape.notation.representation is HEADING
             if level and place.axes == ECEF:
                 raise ValueInvalid("a heading is clockwise from north, which axes ecef do not have")
@@ -276,7 +276,7 @@ def settle(
     stays = not (is_formula or operation.moves)
     says_itself = stays and (on_earth or not {*readers.PARENT_COLUMNS}.isdisjoint(names))
     if says_itself or (not is_formula and (request.results.place is None or request.rows.frames)):
-        return request, shapes  # a look-up looks at each row, an expression at its own frames
+        return request, shapes  # a look-up checks each row, a formula its own frames
     rename = (request.for_kind(shapes[0].kind) if shapes else request).rename
     frame = None if stays or rename is None else rename(ECEF if on_earth and is_formula else None, None)[0]
     if request.results.place is not None:
@@ -288,18 +288,18 @@ def settle(
 
 
 def is_on_earth(value: dict[str, Any]) -> bool:
-    """Return True if a mapping says a position on the Earth, whole or by half."""
+    """Return True if a mapping has a position on the Earth, complete or not."""
     return not {*WHOLE, "mgrs", LLA}.isdisjoint(value) and not grammar.EARTH_KEYS.isdisjoint(value)
 
 
 def placed_record(
     value: dict[str, Any], empty: Record, positions: Sequence[str], inner: Inner, reading: Reading, request: Request
 ) -> Record | None:
-    """Read a record that is placed on the Earth, whole or by half; None for one that is expressed as x, y, z.
+    """Read a record with a position on the Earth, complete or not; None for one with x, y, z.
 
-    empty: the record without what it says; inner: reads the pose that comes with a place, and names its keys
-    The numbers of latitude, longitude and height stay members of the record; no other has a place of its own.
-    Raises Misfit for an incomplete place, for a pose without stated axes, and for an invalid place.
+    empty: the record without numbers; inner: reads the pose in the other keys, and returns it with its keys
+    Numbers of lat, lon and alt keep their paths and are replaced in place; no other numbers have paths.
+    Raises Misfit for an incomplete or invalid position, and for a pose without stated axes.
     """
     own = [key for key in value if key in grammar.EARTH_KEYS]
     in_ecef = value.get("frame", value.get("parent")) in EARTH_FRAMES
@@ -317,11 +317,11 @@ def placed_record(
     covariance = () if operation.only_adds else _of_fix(value, mapping, reading, request)
     pose = grammar.placed_by(mapping, there, reading)
     if pose.rotation is None and (operation.inverse or operation.similar):
-        raise Misfit(UNSAID)  # as a factor it is a pose
+        raise Misfit(UNSAID)  # a factor of a product must be a pose
     is_point = not (pose.rotation or request.rows.kind == POSE) and (operation.takes_points or operation.keeps_frames)
     numbers: tuple[float, ...] = pose.components[: 7 if pose.rotation is not None else 3]
     shape = Shape(POINT if is_point else POSE, 1.0, () if pose.rotation is None else ((notation("quaternion"), False),))
-    if covariance and not is_point:  # of a pose whose turn is exact
+    if covariance and not is_point:  # of a pose with an exact rotation
         covariance = tuple(covariance[3 * i + j] if max(i, j) < 3 else 0.0 for i in range(6) for j in range(6))
     extra, place = covariance, request.results.place
     said = () if extra else pose.covariance or ()
@@ -352,9 +352,9 @@ def placed_record(
 
 
 def _of_fix(value: dict[str, Any], mapping: dict[str, Any], reading: Reading, request: Request) -> tuple[float, ...]:
-    """Return the covariance of a NavSatFix, east, north, up there, in ECEF; () where it has none, or where it stays.
+    """Return the covariance of a NavSatFix in ECEF, from east, north, up; () if it has none or is unchanged.
 
-    Raises Misfit for a fix that was none.
+    Raises Misfit for a status without a fix.
     """
     status, place = value.get("status"), request.results.place
     if type(status) is dict and status.get("status") == "-1":

@@ -1,6 +1,6 @@
-"""What records and rows say besides a pose or point: a covariance, sigmas, a scale; read where it counts, and moved.
+"""Covariances, sigmas and scales in records and rows: read if the operation uses them, and transformed.
 
-Loaded where one of them is there.
+Imported only if a record or a table has one of them.
 """
 
 from __future__ import annotations
@@ -36,10 +36,10 @@ PLACED = (POSE, POINT, VECTOR)
 def with_covariances(
     record: Record, holder: Any, around: Path, keys: Sequence[str], request: Request, reading: Reading
 ) -> Record:
-    """Add the numbers of the covariances of a record, or the one that its sigmas say.
+    """Add the numbers of a record's covariances, or the covariance of its sigmas.
 
-    holder: the mapping that says them, at the path `around`, under some of the keys
-    Where records move, one that begins with -1 is unknown and stays.
+    holder: the mapping that holds them, at the path `around`, under some of `keys`
+    If records are moved, a covariance that begins with -1 is unknown and unchanged.
     """
     operation, shape, path = request.operation, record.shape, record.path
     there = [key for key in keys if key in holder]
@@ -79,7 +79,7 @@ def with_covariances(
 
 
 def _with_numbers(record: Record, key: str, paths: Sequence[Path | None], numbers: Sequence[float]) -> Record:
-    """Add numbers that come last: a covariance, or a scale."""
+    """Add a covariance or a scale, whose numbers follow the others."""
     return record._replace(
         shape=record.shape._replace(covariance=(*record.shape.covariance, len(numbers))),
         numbers=(*record.numbers, *paths), values=(*record.values, *numbers),
@@ -88,24 +88,24 @@ def _with_numbers(record: Record, key: str, paths: Sequence[Path | None], number
 
 
 def _entries(value: Any, sizes: Sequence[int]) -> list[tuple[Path, float]]:
-    """Read a covariance, as `entries_of`; one that was cut short when it was printed says so."""
+    """Read a covariance as `entries_of`; a printed one that is truncated raises an error that says so."""
     return covariance.entries_of(whole_list(value, " or ".join(f"{size} numbers" for size in sizes)), sizes)
 
 
 def is_unknown(value: Any, sizes: Sequence[int]) -> bool:
-    """Return True if a covariance begins with -1: nothing is known of it, nor of what it would be of."""
+    """Return True if a covariance begins with -1: neither it nor its quantity is known."""
     return _entries(value, sizes)[0][1] == UNKNOWN
 
 
 def _of_sources(numbers: Sequence[Any], sigma: Sequence[tuple[int, str]], size: int) -> Components:
-    """Return the covariance of sigmas, each from one of some numbers in its unit, or 0."""
+    """Return the covariance of independent sigmas; sigma: of each axis the index of its number (-1: 0) and unit."""
     zero = numbers[0] - numbers[0]
     entries = covariance.of_sigmas([zero if at < 0 else covariance.in_unit(numbers[at], unit) for at, unit in sigma])
     return entries if size == len(entries) else covariance.of_position(entries)
 
 
 def _with_sigmas(record: Record, own: dict[str, Any], path: Path, reading: Reading, flat: Sequence[str]) -> Record:
-    """Add the covariance that sigmas say; none of its entries is in the text, and the result names them anew."""
+    """Add the covariance of sigmas; its entries have no paths, and the result writes them under new names."""
     size = 36 if record.shape.kind == POSE else uncertainty.POINT
     degrees = read_angle_unit(own["angles"]) if "angles" in own else reading.degrees
     if not flat:
@@ -125,7 +125,7 @@ def _with_sigmas(record: Record, own: dict[str, Any], path: Path, reading: Readi
 
 
 def with_scale(record: Record, value: Any, around: Path, request: Request) -> Record:
-    """Add the scale of a pose, where the operation takes one; else it can only be 1."""
+    """Add the scale of a pose if the operation accepts one; else it must be 1."""
     if not request.operation.similar or around != record.path or type(value) in (dict, list):
         within(around, covariance.refuse_scale, value)
         return record
@@ -135,13 +135,13 @@ def with_scale(record: Record, value: Any, around: Path, request: Request) -> Re
     return _with_numbers(record, SCALE, [(*around, SCALE)], [scale])
 
 
-OTHER_ENTRIES = r"(?:(?!.*twist).*[._/])?covariance[._\[]?\d*\]?"  # as other tools name them
+OTHER_ENTRIES = r"(?:(?!.*twist).*[._/])?covariance[._\[]?\d*\]?"  # names in other tools
 
 
 def covariance_columns(
     table: Table, request: Request, shapes: tuple[Shape, ...]
 ) -> tuple[tuple[int, ...], tuple[Shape, ...]]:
-    """Find the columns of a covariance or of sigmas where they count; return their places and the shapes with them."""
+    """Find the columns of a covariance or of sigmas if the operation uses them; return their indices and the shapes."""
     operation, asked, names = request.operation, request.results, table.names or ()
     kinds = [shape.kind for shape in shapes]
     passes = operation.keeps_frames or operation.only_adds
@@ -149,7 +149,7 @@ def covariance_columns(
     axes = own.axes if own and passes else ECEF
     stay = [name for name in names if re.fullmatch(OTHER_ENTRIES, name)]
     if shapes and place and any(covariance.find_columns(names, size)[0] for size in (9, 36)):
-        if axes != place.axes:  # its columns would be along axes that the result has not
+        if axes != place.axes:  # the covariance is along other axes than the result
             remedy, there = "" if axes or not place.axes else f", or say --local-axes {place.axes}", "the axes there"
             message = f"the covariance is along {axes or there}, the result along {place.axes or there}"
             raise ValueInvalid(f"{message}; leave its columns out{remedy}")
@@ -182,9 +182,9 @@ def covariance_columns(
 def find_rates(
     names: Sequence[str], taken: Collection[int], operation: Operation, source: str
 ) -> list[tuple[tuple[int, ...], str]]:
-    """Find the velocities and rates in a table's columns, three by three, which turn with the axes of poses.
+    """Find velocities and rates among the columns, three by three, that rotate with the axes of poses.
 
-    Warns of those that are taken to be along the axes of the world, and of those that stay.
+    Warns about velocities that are assumed to be along the axes of the world, and about columns that are unchanged.
     """
     rates: dict[tuple[str, ...], list[int]] = {}
     for name, place in sorted(zip(names, range(len(names)), strict=True)):
@@ -206,18 +206,18 @@ def find_rates(
 
 
 MIRRORED = "the covariance cannot be carried through axes that mirror; leave it out"
-SCALED_ALONE = (POINT, VECTOR, NORMAL, POSE)  # what a similarity moves
+SCALED_ALONE = (POINT, VECTOR, NORMAL, POSE)  # kinds that a similarity can move
 
 
 def with_own(
     shape: Shape, pose: Components, extra: Components, mover: Components | None, *, mirrors: bool
 ) -> tuple[Components, Components]:
-    """Return a row's pose with its own covariance or scale, and what else comes with it."""
+    """Return a row's pose with its own covariance or scale, and the remaining numbers."""
     size = shape.covariance[0]
     entries, rest = extra[:size], extra[size:]
     if mirrors and size > 1:
         raise ValueInvalid(MIRRORED)
-    if size == uncertainty.POINT:  # of the position, or of the turn, alone: they turn as that of a vector
+    if size == uncertainty.POINT:  # of position or rotation alone: rotated like that of a vector
         if mover is not None and len(mover) > EXACT:
             raise ValueInvalid(f"covariance has {size} numbers; 36 are needed (6x6) where others count too")
         count = sum(shape.covariance)
@@ -233,9 +233,9 @@ def with_own(
 def of_multiple(
     shape: Shape, own: Components, rotation: Callable[[Components], Components], xp: Namespace
 ) -> Components:
-    """Return the pose of a matrix that may be s R, and s: the root mean square of what each row is long.
+    """Return the pose of a matrix that may be s R, followed by s, the root mean square length of its rows.
 
-    An s that is 1 to what a rotation may be off is 1; whether the rest is a rotation, `rotation` tells.
+    An s within TOLERATED of 1 is exactly 1; `rotation` checks the remaining rotation.
     """
     size = xp.sqrt(sum(entry * entry for entry in shape.rotation(own)) / 3.0)
     s = xp.where(abs(size - 1.0) <= TOLERATED, size - size + 1.0, size)
@@ -245,7 +245,7 @@ def of_multiple(
 
 
 def in_full(shape: Shape, own: Components, extra: Components) -> tuple[Shape, Components]:
-    """Return what comes with a row with its covariance in full, that of sigmas too, and at a place along ECEF."""
+    """Return the shape and the extra numbers of a row with its full covariance, also from sigmas, and along ECEF."""
     size, place = shape.covariance[0], shape.place
     entries = extra[:size]
     if shape.sigma:
@@ -258,7 +258,7 @@ def in_full(shape: Shape, own: Components, extra: Components) -> tuple[Shape, Co
 
 
 def move(shape: Shape, own: Components, extra: Components, mover: Components, *, mirrors: bool) -> Components:
-    """Move what is no pose by one, with its covariances; one that has a covariance gives what moves its own."""
+    """Move a point, vector, twist, .. with its covariances by a pose; the covariance of the pose is propagated."""
     pose, kind = pose_of(mover), shape.kind
     if mirrors and shape.covariance:
         raise ValueInvalid(MIRRORED)

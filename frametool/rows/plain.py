@@ -65,7 +65,7 @@ class Entry(NamedTuple):
     """One record of a text and how its result is made.
 
     target: the shape of the result
-    edge: the pose that moves it; None for none, or for one that depends on its stamp
+    edge: the pose that moves it; None if nothing moves it, or if the pose depends on its stamp
     stamp: the path of the stamp or weight, or the paths of seconds and nanoseconds
     parent, name: the frames of its result
     """
@@ -274,7 +274,7 @@ class RecordText:
 
 
 def json_documents(source: Source) -> list[Document]:
-    """Read strict JSON: what only YAML allows is an error."""
+    """Read strict JSON; syntax that only YAML allows is an error."""
     check_text(source)
     values = strict_json(source)
     return [Document(value, index, source) for index, value in enumerate(values) if value is not None]
@@ -462,7 +462,7 @@ def with_stamp_ns(extras: dict[str, Any], fmt: str) -> dict[str, Any]:
 
 
 def at_time(value: Value, timed: dict[str, Any]) -> Value:
-    """Return a result with a stamp, {} for none; its own is preserved as it is written if there is to be one."""
+    """Return a result with a stamp: its own as written, else `timed`; without a stamp if `timed` is {}."""
     if not isinstance(value, Result):
         return value
     key = stamp_key(value.extras)

@@ -81,9 +81,9 @@ class Record(NamedTuple):
     """One point, vector, pose, twist or wrench: its numbers, their meaning and paths, and its frames.
 
     path: of the mapping or list with the numbers
-    numbers: the path of each number; None for one that is not written and counts as 0
+    numbers: the path of each number; None for a missing one, which is 0
     values: the numbers, in the order of `shape`
-    begins: the path of the first entry of each covariance of a message; one that begins with -1 is unknown
+    begins: the path of the first entry of each covariance of a message; -1 there means unknown
     stamps: the paths of seconds and nanoseconds in its header, then in those around it; stamp_ns: the first stamp
     """
 
@@ -259,7 +259,7 @@ def _mapping(members: Members, path: Path, reading: Reading, request: Request) -
     # with a sigma of the rotation it is a pose
     is_sure = type(sigma) is dict and any(each[:3] in ("rpy", "rol", "pit", "yaw") for each in sigma)
     turns = turned or (not operation.moves and is_sure)
-    # a PointStamped or Vector3Stamped remains one in another format, unless a rotation was asked for
+    # a PointStamped or Vector3Stamped remains one in another format, unless a rotation is requested
     is_kept = operation.changes_nothing and operation.formula is None
     stays = not turns and "header" in value and key in (POINT, VECTOR) and is_kept and not (rows.kind or rows.given)
     stays = stays and {each.spec for each in request.results.notations} <= {"quaternion"}

@@ -3,8 +3,8 @@
 A short stream is computed record by record, without numpy; in longer ones records with the same layout are computed
 together as arrays.
 
-Reading resumes at the line behind a broken JSON line.  It ends at the first broken item of an array, or at the first
-broken value over several lines.  Text that is no record is a `Part` with a problem, so that it is always reported.
+After a broken JSON line, reading resumes at the next line.  It ends at the first broken item of an array, or at the
+first broken value of several lines.  Text that is no record is a `Part` with a problem, so that it is always reported.
 """
 
 from __future__ import annotations
@@ -59,14 +59,14 @@ _AFTER = re.compile(rb"[ \t]*,?[ \t]*\r?\n?")
 _GAP = re.compile(rb"\s*+(,?+)\s*+")
 _OPENING = re.compile(rb"(?:\xef\xbb\xbf)?\s*\[")
 _DECODE = JSONDecoder(parse_int=str, parse_float=str, parse_constant=str).raw_decode  # numbers remain text
-_WORD_AT_END = re.compile(r"[\w.+-]*\s*\Z")  # such as the 1e of 1e-05
+_WORD_AT_END = re.compile(r"[\w.+-]*\s*\Z")  # for example 1e of 1e-05
 _BEHIND_ITEM = re.compile(rb"\s*+[^\s\[]")
 
 
 def run_records(
     stream: ByteStream, fmt: str, request: Request, *, source: str, style: Style | None = None
 ) -> Generator[Outcome]:
-    """Yield the outcomes of a stream of records: text with results in place, or with a style results to be written."""
+    """Yield the outcomes of a stream of records: text with results in place; with a style, results for a writer."""
     outcomes = _outcomes(stream, RecordBlocks(fmt, request, source, style))
     yield from _as_array(outcomes, request.on_error) if fmt == "json" and style is None else outcomes
 
@@ -82,7 +82,7 @@ def _outcomes(stream: ByteStream, work: RecordBlocks) -> Generator[Outcome]:
     if len(first) < sizes.SMALL and readiness(stream, unknown=True)(LONG_MS):
         try:
             second = next(blocks, None)
-        except FormatError as error:  # raised behind the results of the first block
+        except FormatError as error:  # raised after the results of the first block
             failed = error
     are_few = second is None and not work.request.in_order and len(work.splitter.parts(first)[0]) <= sizes.FEW
     is_open: bool | None = True
@@ -118,7 +118,7 @@ def with_offset(text: str, offset_ns: int) -> tuple[str, int]:
     A stamp is the value of one of STAMP_KEYS, or a pair of seconds and nanoseconds.
     """
     edits, pending = list[tuple[int, int, str]](), parse_nodes(text)
-    for node in pending:  # which grows by what is in it
+    for node in pending:  # grows by the values below each node
         if type(node.value) is list:
             pending += node.value
         members = {key: value for key, (_, value) in node.value.items()} if type(node.value) is dict else {}
@@ -166,7 +166,7 @@ class Found:
     """The results, faults and warnings of one block while it is processed.
 
     items: results of single records, by position; runs, alike: those of records with the same layout
-    cutter: finds records with a known layout, None in short streams; singles: records found one by one to have such
+    cutter: finds records with a known layout, None in short streams; singles: records matched to a layout one by one
     kept: number of records with a result, or with null instead of one
     """
 
@@ -191,7 +191,7 @@ class RecordBlocks:
         self._read = partial(attempt, fmt=fmt, request=self.request, name=source)
         shows_all = operation.shown is not None or (request.results.place is not None and not operation.looks_back)
         learns = (sizes.LEARNED or request.in_order) and not (style is not None and shows_all)
-        self._is_singly = not learns  # records are only taken one by one
+        self._is_singly = not learns  # compute all records one by one
         self.ended = True  # whether the last block ended with a line
 
     @cached_property
@@ -347,7 +347,7 @@ def _with_lines(text: bytes, parts: Iterable[Part]) -> Iterator[tuple[Part, int]
         yield part, line
 
 
-# --- where the records of a text are: the syntax around them, without their meaning ---
+# --- positions of records in a text, by syntax alone ---
 
 
 class Part(NamedTuple):
@@ -355,8 +355,8 @@ class Part(NamedTuple):
 
     begin, after: the record with the comma, blanks or separator that are removed together with it
     start, end: the record itself, or the text from the place of the error
-    problem: why it is no record; "" if only reading it can find out
-    final: nothing behind it can be read
+    problem: the error if it is no record; "" if only parsing it can tell
+    final: nothing after it can be read
     """
 
     begin: int
@@ -387,7 +387,7 @@ class Splitter:
 
     def whole(self, text: bytes) -> int:
         """Return the number of bytes that are whole records; called again with more text while it is 0."""
-        if self.layout == DOCUMENTS:  # what has been looked at is not looked at again
+        if self.layout == DOCUMENTS:  # continue where the last search ended
             ends = [found.end() for found in _SEPARATOR.finditer(text, text.rfind(b"\n", 0, self._looked) + 1)]
             self._looked = 0 if ends else len(text)
             return ends[-1] if ends else 0
@@ -397,7 +397,7 @@ class Splitter:
         if MUCH < len(text) < 2 * self._looked:
             return 0
         ended = 0
-        for part in self._values(text, final=False)[0]:  # both pieces must have the meaning that they have together
+        for part in self._values(text, final=False)[0]:  # a cut must not change the meaning of the text
             if part.final or self.layout != ARRAY:
                 is_end = part.final or part.after < len(text) or text.endswith(b"\n")
             else:
@@ -430,7 +430,7 @@ def _of_line(text: bytes, start: int, end: int) -> list[Part]:
         return []
     begin = start + line.find(body)
     found, _ = _scanned(body, 0, array=False, final=True) if _SEVERAL.search(body) else ([], False)
-    if len(found) > 1:  # the end of the line goes with none of several
+    if len(found) > 1:  # none of several records includes the end of the line
         return [each.behind(begin)._replace(final=False) for each in found]
     stop = begin + len(body)
     after = _AFTER.match(text, stop).end()  # type: ignore[union-attr]
@@ -479,7 +479,7 @@ def _value(text: str, at: int) -> tuple[int, str | None]:
 
 
 def _scanned(data: bytes, at: int, *, array: bool, final: bool, first: bool = True) -> tuple[list[Part], bool]:
-    """Scan values from an offset on; one that may continue behind the text ends the scan, unless the text is final."""
+    """Scan values from an offset; unless the text is final, a value that may continue after it ends the scan."""
     found: list[Part] = []
     text = data.decode("latin-1")  # keeps every offset; the syntax of JSON is ASCII
     needs_comma = array and not first
@@ -514,7 +514,7 @@ def _scanned(data: bytes, at: int, *, array: bool, final: bool, first: bool = Tr
 
 
 def _documents(text: bytes) -> Iterator[Part]:
-    """Yield the documents of a YAML text that hold more than comments, each with the separator behind it."""
+    """Yield the documents of a YAML text that hold more than comments, each with the separator after it."""
     start = 0
     for mark in (*_SEPARATOR.finditer(text), None):
         after = len(text) if mark is None else mark.end()

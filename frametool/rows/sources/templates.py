@@ -48,10 +48,10 @@ MOST_TRIED = 8  # of them tried on whole blocks
 MOST_LOOKED = 1 << 16  # bytes in which the first remaining record is searched for
 WORTH_CUTTING = 1 << 12  # bytes
 MOST_NAMES = 1 << 16  # of frames, remembered
-# a number: exact for JSON; for YAML what it matches is checked when it is read
+# the syntax of a number: exact for JSON; for YAML each match is checked when it is read
 YAML_NUMBER = r"[-+.]?[0-9][-+.0-9eE]*+"
 JSON_TEXT = r'"[^"\\\x00-\x1f]*(?:\\(?:["\\/bfnrt]|u[0-9a-fA-F]{4})[^"\\\x00-\x1f]*)*"'
-# what may replace an unused scalar, by its quotes: never text that could be more than one scalar
+# texts that may replace an unused scalar, by its quotes; each is certainly a single scalar
 YAML_PLAIN = r"(?:-(?! )|[A-Za-z0-9_./+])(?:[\w./+-]| (?=[\w./+(-])|:(?=[\w/]))*"
 FREE = {
     (True, '"'): JSON_TEXT,
@@ -68,25 +68,25 @@ FRAME = {
 }
 STAMP = r"(?:0|[1-9]\d{0,8}|[1-3]\d{9})(?![.\deE])", r"(?:0|[1-9]\d{0,8})(?![.\deE])"  # seconds, nanoseconds
 NOT_UNKNOWN = r"(?!-1(?:\.0*)?(?:[eE][-+]?0+)?(?![.\deE]))"  # an unknown covariance begins with -1
-# scalars under these keys decide what a record is, at any depth ..
+# scalars under these keys influence how a record is read, at any depth ..
 DECISIVE = frozenset((*POINT_KEYS, *ROTATION_KEYS, AXES_KEY, *PARENT_COLUMNS, *NAME_KEYS))
 # .. and these in the mappings around the record, unless their value is a single number
 _WORDS = frozenset(
     word.partition("_deg")[0].partition("_rad")[0] for word in {*OURS, *POSE_KEYS, "theta"} - LISTED_WORDS
 )  # fmt: skip
-COVARIANCE = "covariance"  # the entries of one that is unchanged decide nothing
+COVARIANCE = "covariance"  # the entries of an unchanged covariance have no influence
 RESULT_KEYS = DESCRIPTIVE - {"frame"}  # a number under these belongs to a result; null may be another record
-OF_ALL = ("unnamed", "identity", "no-alt", "band-s", "stays", "left-out")  # rules of warnings for all
+OF_ALL = ("unnamed", "identity", "no-alt", "band-s", "stays", "left-out")  # rules of warnings for all records
 
 
 class Template:
     """The layout of records, learned from one of them.
 
     stretches: start and end of each part of the text
-    numbers: the stretches of the numbers of the poses, in order; none if one of them is not a plain number
+    numbers: the stretches of the numbers of the poses, in order; () if one of them is not a plain number
     stamps: the stretches of each entry's stamp
     named: the stretches of frames whose names may differ; frames: for each entry the indices among these of its parent
-        and its name, None for one that is the same in all records
+        and its name, None for a name that is the same in all records
     pieces: the pieces of the result; roles: for each name among them its entry, parent (0) or name (1), and its node
     notes: the warnings that hold for all records
     leaves: with a style, the scalars that differ: the stretch and the node of each
@@ -105,7 +105,7 @@ class Template:
             number.fullmatch(self.text, *_text_of(node)) for node in own
         )  # fmt: skip
         own = own if self.regular else []
-        self._patterns = {  # of what may be there
+        self._patterns = {  # of the texts that may differ
             _text_of(node): NOT_UNKNOWN * (path in record.begins) + number.pattern
             for node, (record, path) in zip(own, paths, strict=False)
         }
@@ -136,7 +136,7 @@ class Template:
             for entry, each in reversed([*enumerate(frames)]) for role, node in enumerate(each) if node is not None
         }  # fmt: skip
         self.roles = [roles[each.at] for each in pieces if isinstance(each, Renamed) and each.at in roles]
-        places = count(len(self.stretches) + 2)  # behind the stretches and the text around a record
+        places = count(len(self.stretches) + 2)  # keys after those of the stretches and the separators
         self.pieces = [
             each if not isinstance(each, Renamed) else In(next(places)) if each.at in roles else Const(each.text)
             for each in pieces
@@ -220,9 +220,9 @@ class Template:
         return found, others
 
     def _frames_of(self, entry: Entry) -> list[Node | None]:
-        """Return the nodes of a record's parent and name, None for one that must be the same in all records.
+        """Return the nodes of a record's parent and name, None for a name that must be the same in all records.
 
-        A name may differ if it is plain text at one place, and is not one that counts rows.
+        A name may differ if it is plain text in a single place, and no counter of rows.
         """
         record, request, found = entry.record, self._request, list[Node | None]()
         is_placed = record.keys.placed or record.shape.place or request.results.place or request.rows.given_place
@@ -293,7 +293,7 @@ def _text_of(node: Node) -> tuple[int, int]:
 class Cut(NamedTuple):
     """The records of one template in a block: starts and ends (n, stretches + 2) of their stretches.
 
-    The last two columns are the separators behind and before a record.
+    The last two columns are the separators after and before a record.
     """
 
     template: Template
@@ -332,7 +332,7 @@ class RecordCutter:
         """Start without templates."""
         self.splitter, self.read = splitter, read
         self.templates: list[Template] = []
-        self.left = sizes.LEARNED  # records to learn from: where all differ, learning is lost time
+        self.left = sizes.LEARNED  # records left to learn from: if all differ, learning is wasted
 
     def cut(self, text: bytes) -> tuple[list[Cut], list[tuple[int, int]]]:
         """Return the records of a block that match templates, and the rest of the block."""
@@ -385,7 +385,7 @@ class RecordCutter:
             return None
         self.left -= bool(is_alike)
         template = Template(known)
-        if not known.is_long:  # no expression is compiled for such
+        if not known.is_long:  # too long for an expression
             self.templates = [*self.templates[-MOST_TEMPLATES + 1 :], template]
             if hit := self.match(text, part):
                 return hit
@@ -397,7 +397,7 @@ class RecordCutter:
 def _cut_by(template: Template, text: bytes, rest: list[tuple[int, int]], cuts: list[Cut]) -> list[tuple[int, int]]:
     """Split the rest of a block by one expression and add the records to `cuts`; return what is left."""
     left = list[tuple[int, int]]()
-    sizes = np.array([-1, *template.sizes, -1])  # with what is before a record and what follows it
+    sizes = np.array([-1, *template.sizes, -1])  # with the text before and the separator after a record
     varying = np.flatnonzero(sizes < 0)
     for start, end in rest:
         pieces = template.block_pattern.split(text[start:end])
@@ -495,7 +495,7 @@ def plan_of(template: Template, request: Request, *, yaml: bool) -> Plan:
     if timed is not None and not timed.name and request.operation.formula is not None:
         timed = timed._replace(name=key if len(stamp) == 1 else "")  # the key that was found has the unit in its name
     extra = None if request.rows.stamp_or_weight_column is None else key
-    return Plan(  # bad records are taken one by one
+    return Plan(  # bad records are computed one by one
         tuple(entry.record.shape for entry in entries),
         tuple(entry.target for entry in entries),
         request._replace(on_error=SKIP, timed=timed, offset_ns=0).with_rows(stamp_or_weight_column=extra),
