@@ -126,7 +126,7 @@ def entries_of(value: Any, sizes: Sequence[int]) -> list[tuple[Path, float]]:
 
 
 def spelled(value: Any) -> list[tuple[str, Path, Any]]:
-    """Return `{xyz: .., rpy_deg: ..}` as columns: of each sigma its name, path and text; one number is all three."""
+    """Return `{xyz: .., rpy_deg: ..}` as columns: name, path and text of each sigma; one number is for three axes."""
     if type(value) is not dict or not value:
         raise Misfit(f"sigma must be {{xyz: .., rpy_deg: ..}}, found {kind(value)}")
     found: list[tuple[str, Path, Any]] = []
@@ -145,9 +145,9 @@ def spelled(value: Any) -> list[tuple[str, Path, Any]]:
 
 
 def read_sigmas(said: Sequence[tuple[str, Path, Any]], size: int = 36, *, degrees: bool) -> list[float]:
-    """Read sigmas as six numbers, metres and radians: of each the name of its column, its path and text.
+    """Read sigmas as six numbers in metres and radians; said: the column name, path and text of each.
 
-    size: as of `find_columns`; degrees: the unit of bare angles
+    size: as for `find_columns`; degrees: the unit of bare angles
     """
     sigmas = [0.0] * 6
     for axis, (at, own_unit) in enumerate(find_columns([name for name, _, _ in said], size)[1]):

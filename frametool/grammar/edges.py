@@ -27,10 +27,10 @@ class Edge(NamedTuple):
     stamp_ns: None if static
     line: line number in the file, 0 if unknown
     received_ns: the time at which the recorder received it, if known
-    path: in a document, the keys that lead to it from the top
-    topic: the topic that it came by, if known
+    path: the keys that lead to it in a document
+    topic: the topic on which it was published, if known
     covariance: 36 entries as in `geometry.uncertainty`, the same for all samples of a frame; None: exact
-    camera: that of the child, if its entry has one
+    camera: the camera of the child, if its entry has one
     """
 
     parent: str | None
@@ -46,9 +46,9 @@ class Edge(NamedTuple):
 
 
 class EdgeColumns(NamedTuple):
-    """Edges, column by column, in the order of the file: all of frames that move, or all static.
+    """Edges, column by column, in the order of the file: all moving, or all static.
 
-    is_ordered: their stamps are expected to be in order, as those of a trajectory; they are not in a recording
+    is_ordered: the stamps should be in order, as in a trajectory; those of a recording need not be
     """
 
     parents: Sequence[str]
@@ -110,12 +110,12 @@ class Diagnostics:
     def __init__(self) -> None:
         """Create empty diagnostics; `rough` and `noise` hold line numbers, `others` counts by topic.
 
-        assumed: what the file does not state and was assumed, with the option that sets it, or was omitted
+        assumed: what was assumed because the file does not state it, with the option that sets it; or what was omitted
         axes: frame -> the axes of a camera frame, `optical` or `opengl`
         drawn: of a file without poses, child -> the rate of its edge
         projected: the largest deviation of a matrix from a rotation, in formats that round them
-        robot: of a file with joints, the values of the fixed ones, the links that they move, and those without a value
-        unknown_joints: the passed ones that it does not have, each with its error, because another file may have them
+        robot: of a file with joints, the values of fixed joints, the links that they move, and joints without a value
+        unknown_joints: joints with a value that the file does not have, each with its error; another file may have them
         """
         self.assumed = ""
         self.axes: dict[str, str] = {}
@@ -130,7 +130,7 @@ class Diagnostics:
         self.notes: dict[str, Finding] = {}
 
     def note(self, message: str, line: int, rule: str = "odd") -> None:
-        """Record a message, once; for rotations that had to be normalised only the lines."""
+        """Record a message once; for normalised rotations only the lines."""
         if rule == "rounded":
             self.rough.append(line)
         else:
@@ -191,7 +191,7 @@ class Topics:
         return topic.strip("/") in self.chosen
 
     def conflict(self, topic: str, child: str) -> str:
-        """Return an error if a frame comes from two namespaces, as with two robots; once for each frame."""
+        """Return an error if a frame is published in two namespaces, as by two robots; once for each frame."""
         first = self._first.setdefault(child, topic)
         if first == topic or (child, topic) in self._reported:
             return ""

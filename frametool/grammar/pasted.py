@@ -73,7 +73,7 @@ _DECORATED = r"""[\x1b\\⎡⎛`^\xd7]|<|\[\d*,?\d*\]|[A-Za-z]\w{,60}[(: ]|(?m:^[
 
 
 def number_rows(text: str, *, any_text: bool = False) -> Rows | None:
-    """Split a print of numbers into rows; None if the text is not one.
+    """Split printed numbers into rows; None if the text is something else.
 
     any_text: keep words between the numbers, for a reader that reports them.
     Raises ValueInvalid for a truncated print, for one by columns, and for commas that may be decimal commas.

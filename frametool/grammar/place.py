@@ -51,7 +51,7 @@ DMS = re.compile(
 
 
 def without_place(mapping: dict[str, Any]) -> dict[str, Any]:
-    """Return the other keys of a mapping with a position on the Earth: the pose that begins there."""
+    """Return the other keys of a mapping with a position on the Earth: a pose relative to that position."""
     return {key: value for key, value in mapping.items() if key not in EARTH_KEYS and key != AXES_KEY}
 
 
@@ -287,7 +287,7 @@ def _incomplete(own: dict[str, Any]) -> str:
 
 
 def check_in_ecef(parent: str | None, place: Place) -> None:
-    """Raise ValueInvalid unless a result is in the Earth's frame, or its frame is not known and could be."""
+    """Raise ValueInvalid unless a result is in the Earth's frame."""
     if parent in EARTH_FRAMES:
         return
     names = ",".join(each.name for each in (place, *place.more))
@@ -369,9 +369,9 @@ def overview(pose: Pose) -> list[tuple[str, str]]:
 
 
 def frame_entry(pose: Pose, place: Place) -> tuple[dict[str, Any], Pose]:
-    """Return a frame of ecef as a tree has it, `at` and `axes`, and its pose and covariance in these axes.
+    """Return a frame of ecef as an entry of a tree: `at` and `axes`, and its pose and covariance in these axes.
 
-    Raises as `placed_entry` does, and for grid axes whose zone is not stated.
+    Raises as `placed_entry`, and for grid axes without a stated zone.
     """
     if place.axes == GRID and place.zone is not None and UTM not in (place.name, *(each.name for each in place.more)):
         raise ValueInvalid(f"--to {place.name} does not state the zone of axes grid; --to utm does")

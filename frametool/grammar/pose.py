@@ -254,9 +254,9 @@ _ROWS_OF_A_POSE = 12  # numbers of a 3x4 matrix
 
 
 def pose_of_numbers(texts: Sequence[str], default: Notation | None, reading: Reading) -> Pose:
-    """Read bare numbers: a rotation in the order of its representation, after x y z if there is a position.
+    """Read bare numbers: a rotation in the order of its representation, after x y z if there are more.
 
-    Raises NotARotation for an invalid rotation, ValueInvalid for a list that is not such numbers.
+    Raises NotARotation for an invalid rotation, ValueInvalid for any other list.
     """
     rep = default or notation_of(texts)
     whole, size = rep.representation.whole, len(rep.representation.columns)
@@ -305,7 +305,7 @@ def are_rotation(rows: Sequence[Sequence[str]]) -> bool:
 
 
 def notation_of(texts: Sequence[str]) -> Notation:
-    """Return the notation of bare numbers without --from; only a matrix is known by their number."""
+    """Return the notation of bare numbers without --from; only that of a matrix is known by their number."""
     if len(texts) in (9, _ROWS_OF_A_POSE, 16):
         return parse_notation("matrix")
     choices = ", ".join(REPRESENTATIONS)

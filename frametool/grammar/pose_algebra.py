@@ -160,7 +160,7 @@ class Lookups:
         self.widest: Sequence[float] = ()
 
     def result(self, target: str, source: str, at_ns: int | None) -> Result:
-        """Look up at one time; None is the latest, and the result states it."""
+        """Look up at one time; None is the latest time, which is then the stamp of the result."""
         at_ns = self.tree.latest(target, source) if at_ns is None and self.tree.moves else at_ns
         found = self.tree.lookup_components(target, source, at_ns)
         if not self.carried:

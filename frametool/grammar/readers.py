@@ -1,6 +1,6 @@
-"""Small readers for the values of documents, shared by all grammars; names of keys and columns of frames and stamps.
+"""Small readers for values of documents, shared by all grammars; names of keys and columns of frames and stamps.
 
-One table of names for mappings, messages and headers of tables: a name means the same everywhere.
+One table of names serves mappings, messages and headers of tables: a name has the same meaning everywhere.
 """
 
 from __future__ import annotations
@@ -115,9 +115,9 @@ class Reading:
     ) -> None:  # fmt: skip
         """Start at the top of a document of `source`; `notes` collects warnings.
 
-        `bare_numbers` is set for formats of other tools, which have neither `90deg` nor `pi/2`.  earth: options for all
-        positions on the Earth.  `framed` is set if poses are those of frames: a frame on the Earth has axes even
-        without a rotation.
+        earth: options for all positions on the Earth
+        `bare_numbers` is set for formats of other tools, which have neither `90deg` nor `pi/2`.  `framed` is set if
+        poses are those of frames: a frame on the Earth has axes even without a rotation.
         """
         self.source = source
         self.degrees = degrees
@@ -330,7 +330,7 @@ _SIGMAS = ("sigma_x", "sigma_y", "sigma_z", "sigma_r", "sigma_p")
 
 
 def may_be_uncertain(name: str) -> bool:
-    """Return True if a column may be of a covariance, c11, or a sigma: `sigma_yaw_deg`, `sigma_z [mm]`."""
+    """Return True if a column may belong to a covariance, c11, or be a sigma: `sigma_yaw_deg`, `sigma_z [mm]`."""
     return name == "c11" or "covariance" in name or name.startswith(_SIGMAS)
 
 

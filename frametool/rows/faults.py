@@ -21,7 +21,7 @@ DONE, ROWS_SKIPPED = 0, 3
 class Fault(NamedTuple):
     """A bad row.
 
-    line: of the row, from the start that the caller counts from
+    line: of the row; from 0 within a block, from 1 in a report
     column: the name or number of the bad column; "" for the whole row
     reason: why it is bad, as an error or a message
     final: nothing after it can be read

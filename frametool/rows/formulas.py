@@ -95,7 +95,7 @@ class PixelsOfPoints(Seen):
     def result(
         self, row: str, parts: Components, cells: Sequence[Number], times_ns: Number, xp: Namespace  # noqa: ARG002
     ) -> Components:
-        """Return the numbers of points in the camera's frame."""
+        """Return the numbers of points that are expressed in the camera's frame."""
         x, y, z = parts[:3]
         u, v, depth = self.camera.pixels_of(x, y, z)
         sized = self.camera.size is not None

@@ -251,7 +251,7 @@ class RecordText:
     def notes_at(self, line: int, column: int, answers: Sequence[Answer] = ()) -> list[RowNote]:
         """Return all warnings about the records and their results, each with its place.
 
-        line, column: where the text begins; lines count from 0
+        line, column: the start of the text; lines count from 0
         """
         begin, found = Source("", self.text, line, column), list[RowNote]()
         places = locate_many(self.text, [note.path for note in self.notes]) if self.notes else ()
@@ -286,7 +286,7 @@ def json_documents(source: Source) -> list[Document]:
 def read_poses(source: Source, asked: Request) -> list[Pose]:
     """Return all poses of a text, at least one.
 
-    asked: the unit of bare angles, the check of rotations, and the operation, which may not support scales
+    asked: sets the unit of bare angles, the check of rotations, and whether scales are accepted
     Raises FormatError with the place.
     """
     return read_given(source, asked)[0]
@@ -331,7 +331,7 @@ def read_text(source: Source, request: Request) -> RecordText:
 def results(source: Source, request: Request, style: Style) -> Iterator[Value]:
     """Yield the results of all records of a text: poses with the other fields of their records, or mappings.
 
-    Raises FormatError with the place of a record that cannot be read or has no result.
+    Raises FormatError with the place of a record that cannot be read or that has no result.
     """
     if request.operation.looks_back:
         raise Misused("rows are compared with those before them in streams; pipe them in as JSON lines, YAML or CSV")
@@ -382,7 +382,7 @@ def values_of_unit(root: Node, answers: list[Answer], request: Request, style: S
 
 
 def _of_several(root: Node, answers: list[Answer], request: Request) -> dict[str, Any]:
-    """Return the results of several fields of one message, as of an Imu, as one flat mapping with a key per number."""
+    """Return the results of several fields of one message, such as an Imu, as a flat mapping with a key per number."""
     last = answers[-1].entry  # an unknown orientation is the first, and unchanged
     found = {"frame": last.parent} | _header_stamp(last.record) | _rest(root, last.record)
     for each in answers:

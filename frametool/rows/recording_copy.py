@@ -1,4 +1,4 @@
-"""One copy of a recording: which edges are added or replaced, which messages move, and what is reported.
+"""Copy one recording: add or replace edges, move messages into another frame, and report what was done.
 
 Poses and points are transformed at their stamps, including covariances; the twist of an Odometry is in its child's
 frame and is unchanged.
@@ -149,10 +149,10 @@ class RecordRun:
         return chosen
 
     def _plan(self, tree: Frames) -> None:
-        """Group the edges of a tree: missing in the recording, present with the same values, or with others.
+        """Group the edges of a tree: missing in the recording, present with the same values, or with other values.
 
-        Raises BadTopology for a frame that moves here or there, has another parent or would be below itself, and for
-        other values without `replace`.
+        Raises BadTopology for a frame that moves in one of them, has another parent or would be below itself; without
+        `replace` also for other values.
         """
         for said, _, sent in chain.from_iterable(raw_transforms(self.reader, self.used, Answers())):
             parent, child = self.names.bare(said.parent), self.names.bare(said.child)
@@ -193,9 +193,9 @@ class RecordRun:
         self._place(added)
 
     def _place(self, added: dict[str, Edge]) -> None:
-        """Choose the topics of added edges, `tf_static` in the namespace of the frames above them; warn of those apart.
+        """Choose the topics of added edges: `tf_static` in the namespace of the frames above them.
 
-        Raises BadTopology for a frame that would be below itself.
+        Warns about edges that are not connected to the recording.  Raises BadTopology for a frame below itself.
         """
         above = {child: str(edge.parent) for child, edge in added.items()}
         everywhere = {child: [*edge.parents][-1] for child, edge in self.known.items()} | above

@@ -78,14 +78,14 @@ class Shown(NamedTuple):
     replaces: bool = False
 
     def cells(self, names: Sequence[str], numbers: Components) -> dict[str, Any]:
-        """Return the cells of a table."""
+        """Return the numbers as cells of a table, by column."""
         return {
             name: self.words[at][int(number)] if at in self.words else _or_none(number)
             for at, (name, number) in enumerate(zip(names, numbers, strict=True))
         }
 
     def values(self, prefix: str, numbers: Components) -> dict[str, Any]:
-        """Return the members of a record."""
+        """Return the numbers as members of a record, by key."""
         from frametool.documents.source import Verbatim
         from frametool.rows.sinks import Word
 
@@ -113,7 +113,7 @@ class Operation(NamedTuple):
     moves: rows are expressed in another frame, so that points and vectors are allowed
     turns: the axes convention changes: `right` is a rotation alone, which leaves the position unchanged
     mirrors: the row is reflected across y, before `left` is applied
-    formula: an expression instead of all this; it receives a point moved by its edge, or without a point that edge
+    formula: an expression instead of all this; it receives the point of a row moved by its edge, or the edge alone
     uncertain: the poses that move rows, by frame or by time, have covariances that are propagated
     similar: the scale of a pose is applied and is part of the result; multiples: so is the scale of a matrix s R
     A pose has seven components, with a scale eight, with a covariance 43, as in `geometry.rigid`.
@@ -200,13 +200,13 @@ class Operation(NamedTuple):
 
     @property
     def changes_nothing(self) -> bool:
-        """Return True if rows only change their notation."""
+        """Return True if poses and points are unchanged, except for their notation or axes."""
         changed = self.left or self.right or self.of or self.moves or self.mirrors
         return not (changed or self.inverse)
 
     @property
     def keeps_frames(self) -> bool:
-        """Return True if records stay in the frames they name."""
+        """Return True if the frames of records are unchanged."""
         return self.shown is not None or (self.changes_nothing and (self.formula is None or self.formula.adds))
 
     @property
@@ -508,7 +508,7 @@ class Request(NamedTuple):
         return self._replace(rename=lambda parent, name: formula.rename(kind, parent, name))
 
     def counts(self, frame: str) -> bool:
-        """Return True if what is under `frame` is a counter rather than a frame's name."""
+        """Return True if the value of `frame` is a counter, not the name of a frame."""
         return self.rows.frame_is_counter and frame.isdecimal()
 
 

@@ -74,7 +74,7 @@ class PoseWriter(ResultWriter):
         self.target = target_of(style, first.kind, placed=self.placed)
 
     def columns(self, block: RowPoses) -> Components:
-        """Return the numbers of a block as columns."""
+        """Return the numbers of a block as contiguous columns."""
         return tuple(map(np.ascontiguousarray, block.numbers.T))
 
     def settle(self, block: RowPoses) -> None:
@@ -338,7 +338,7 @@ class AlikeRows(NamedTuple):
     """Results with the same layout, one per row.
 
     places: (n,) the position of each; numbers: (n, k) the numbers to write
-    block: the poses with their frames and stamps; its extras are the other scalars by mark, of records without quotes
+    block: the poses with their frames and stamps; its extras are the other scalars by mark, those of records unquoted
     """
 
     marked: Marked

@@ -181,7 +181,7 @@ class Found:
 
 
 class RecordBlocks:
-    """Process blocks of records: results replace the numbers in the text, or are values and rows for a writer."""
+    """Process blocks of records: results replace the numbers in the text, or are passed to a writer."""
 
     def __init__(self, fmt: str, request: Request, source: str, style: Style | None = None) -> None:
         """Start without templates."""
@@ -466,7 +466,7 @@ def _layout_of(text: bytes, *, final: bool) -> str:
 
 
 def _value(text: str, at: int) -> tuple[int, str | None]:
-    """Return the end of the JSON value at an offset and "", or the place and message of an error, None if cut off."""
+    """Return the end of the JSON value at an offset and "", or the place and message of an error (None if cut off)."""
     try:
         return _DECODE(text, at)[1], ""
     except RecursionError:

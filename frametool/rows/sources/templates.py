@@ -306,9 +306,9 @@ class Cut(NamedTuple):
         return starts[-1], starts[0], starts[-2], int(self.ends[row, -2])
 
     def frames(self, text: bytes) -> Called:
-        """Return the distinct frames of the records and their results, and the index of each record's.
+        """Return the distinct frames of the records and of their results, and the index of each record's.
 
-        None instead of frames with which the result would be written differently.
+        None for frames whose result needs another template.
         """
         columns, data = list[list[bytes]](), np.frombuffer(text, np.uint8)
         for named in self.template.named:
@@ -373,7 +373,7 @@ class RecordCutter:
         return None
 
     def learned(self, known: RecordText, text: bytes, part: Part) -> Hit | None:
-        """Learn a template from a record; from any if records depend on each other, else from those worth it.
+        """Learn a template from a record: from every record if their order matters, else from few and short ones.
 
         The template is remembered unless the record is long.
         """
@@ -385,7 +385,7 @@ class RecordCutter:
             return None
         self.left -= bool(is_alike)
         template = Template(known)
-        if not known.is_long:  # too long for an expression
+        if not known.is_long:  # else the expression is too long
             self.templates = [*self.templates[-MOST_TEMPLATES + 1 :], template]
             if hit := self.match(text, part):
                 return hit
@@ -436,7 +436,7 @@ def by_template(cuts: Iterable[Cut], singles: Iterable[tuple[Part, Hit]]) -> lis
 
 
 def in_order(cuts: Sequence[Cut]) -> list[Cut]:
-    """Split cuts so that all records are in the order of the text; a record with several entries is one by itself."""
+    """Split cuts so that all records are in the order of the text; a record with several entries gets its own cut."""
     if not cuts:
         return []
     sorts = np.concatenate([np.full(len(cut.starts), index) for index, cut in enumerate(cuts)])
@@ -511,7 +511,7 @@ def plan_of(template: Template, request: Request, *, yaml: bool) -> Plan:
 
 
 def is_text(block: bytes) -> bool:
-    """Return True if bytes are UTF-8, which an expression for bytes does not check."""
+    """Return True if bytes are UTF-8, which a regular expression for bytes does not check."""
     try:
         block.decode()
     except UnicodeDecodeError:
