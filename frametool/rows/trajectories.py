@@ -54,8 +54,8 @@ WORDS = {  # the text values of settings of `compare`
     "match": ("interpolate", "nearest"), "pairs_from": ("reference", "estimate"),
 }  # fmt: skip
 RECORDINGS = tuple(name for name, row in FORMATS.items() if row.reader == BAG)
-TREE = rb"""(?m)^[^\S\n]*+(?:---\s*+)?+(?:\{\s*+)?+["']?(?:frames|transforms|angles)["']?\s*:"""  # of a tree
-POSITIONS = rb"""(?m)(?:^|[{,.]\s*)["']?(?:point|latitude)["']?\s*[:,.]"""  # of a message that is no pose
+TREE = rb"""(?m)^[^\S\n]*+(?:---\s*+)?+(?:\{\s*+)?+["']?(?:frames|transforms|angles)["']?\s*:"""  # keys of a tree file
+POSITIONS = rb"""(?m)(?:^|[{,.]\s*)["']?(?:point|latitude)["']?\s*[:,.]"""  # keys of a message without a pose
 
 
 def load_trajectory(

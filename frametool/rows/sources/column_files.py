@@ -95,7 +95,7 @@ class ColumnRows(PlannedRows):
         header = tuple(quoted(name).encode() for name in names or ())
         table = Table(b",", names, file.width, header=header, source=source, normals=file.vectors)
         is_stamped = dict(zip(names or (), file.kinds, strict=False)).get(STAMP_KEYS[0]) == STAMP_NS
-        try:  # `t` or `time` of a cloud is what its sensor counts, in whatever unit; what we write there says it
+        try:  # `t` or `time` of a cloud has an unknown unit; a column that frametool writes states it
             super().__init__(table._replace(stamped=is_stamped or not file.vectors), request)
         except FormatError as error:
             error.line = 0  # binary files have no line with names

@@ -146,7 +146,7 @@ class Template:
 
     @cached_property
     def block_pattern(self) -> re.Pattern[bytes]:
-        """Match a record with this layout where one may begin; its last group is the separator behind it."""
+        """Match a record with this layout where one may begin; the last group is the separator after it."""
         begin, end = rb"(?:\A|(?<=\n---\n)|(?<=\n--- )|(?<=\n---\r\n))", rb"(---(?:[ \t]*\r?\n| (?=\S)))"
         if self.json:
             begin, end = rb"(?m:^)", rb"([ \t]*,?[ \t]*\r?\n)"
