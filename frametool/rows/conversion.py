@@ -94,6 +94,8 @@ class Blocks(ResultWriter):
             self.writer = writer_for(self.style, block)
         if block.kind != self.writer.kind:
             raise ValueInvalid(f"one file holds things of one kind, found {self.writer.kind} and {block.kind}")
+        if block.placed > self.writer.placed:
+            raise ValueInvalid("the first rows are rotations without a position, others have one; add it to all")
         return self.writer.of_block(block._replace(placed=self.writer.placed))
 
     def end(self) -> Iterator[bytes]:

@@ -109,6 +109,13 @@ def test_poses_of_two_blocks_of_which_one_has_stamps_are_none(
     assert "some poses have a stamp and some have none" in done.err
 
 
+def test_positions_behind_a_block_of_rotations_are_refused_in_columns(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("frametool.sizes.BLOCK", 1)
+    done = run("convert", "-o", "a.npy", stdin=lines({"rpy": [0, 0, 0]}, POSE))
+    assert (done.status, "rotations without a position, others have one" in done.err) == (1, True)
+    assert run("convert", "-o", "a.npy", stdin=lines(POSE, {"rpy": [0, 0, 0]})).status == 0
+
+
 THINGS: dict[str, tuple[dict[str, Any], str, str]] = {
     "point": ({"point": [1, 2, 3]}, "x,y,z", "1,2,3"),
     "pose": ({"xyz": [1, 2, 3], "rpy": [0, 0, 0]}, NAMES, "1,2,3,0,0,0,1"),
