@@ -376,7 +376,7 @@ def _new_columns(
 
 
 def pieces_of(columns: Sequence[Column], width: int, delimiter: bytes) -> tuple[Piece, ...]:
-    """Return the pieces of a row's text for its columns; neighbouring unchanged columns form one stretch.
+    """Return the pieces of a row's text for its columns; neighbouring unchanged columns are one stretch.
 
     The key of a stretch is its two bounds in a row: 0 is the start of the line, cell i begins at 2 i + 1 and ends at
     2 i + 2, and the last bound is the end of the line.  The key of a written name is its `Named`.
