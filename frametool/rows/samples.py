@@ -149,7 +149,7 @@ class MeanRows(Gathered):
         """Begin without rows; weights: the column or key of the weights, by: that of the labels."""
         super().__init__()
         self.key, self.by = by or weights, by
-        self.uncertain = self.stamped = False
+        self.uncertain = self.stamped = self.local = False  # local: results have other axes, so no covariance
         self.extra, self.labels = list[Any](), dict[str, int]()
         self.named: list[str] = []
         self.place: Callable[[int], str] = str
@@ -268,7 +268,7 @@ def means_of(rows: MeanRows, values: list[float] | None, *, robust: bool) -> Ite
         if turned:
             extras |= {"angle_rms": radians, "angle_rms_deg": degrees(radians)}
             extras |= {"angle_max": widest, "angle_max_deg": degrees(widest)}
-        if covariance is not None:
+        if covariance is not None and not rows.local:
             if placed:
                 extras |= {f"std_{axis}": sqrt(covariance[at, at]) for at, axis in enumerate("xyz")}
             if turned:

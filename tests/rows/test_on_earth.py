@@ -743,6 +743,17 @@ def test_columns_of_that_of_a_fix_are_told_where_they_stay_and_left_out_of_calc(
     assert "c33" in stays.out
 
 
+@pytest.mark.parametrize("to", [["lla"], ["utm"], ["enu", "--origin", "48.1,11.5,0"]])
+def test_the_spread_of_a_mean_is_along_ecef_and_left_out_at_a_place(run: Callable[..., Any], to: list[str]) -> None:
+    rows = "lat,lon,alt\n48.1,11.5,0\n48.2,11.5,0\n"
+    assert {"std_x", "covariance"} <= json.loads(run("mean", "--to", "ecef", "-f", "json", stdin=rows).out).keys()
+    done = run("mean", "--to", *to, "-f", "json", stdin=rows)
+    assert done.err == "frametool: warning: covariances left out: a mean at a place has none\n"
+    found = json.loads(done.out)
+    assert found["distance_rms"] == pytest.approx(5560.0, rel=1e-3)
+    assert not {"std_x", "covariance"} & found.keys()
+
+
 def test_a_trajectory_of_positions_is_resampled_at_places(run: Callable[..., Any]) -> None:
     rows = "t,lat,lon,alt\n0,48,11,500\n1,48,11,500\n2,48,11,500\n"
     found = run("resample", "gps.csv", "--rate", "1", "--to", "utm", "-f", "csv", files={"gps.csv": rows}).out.splitlines()

@@ -5,8 +5,6 @@ from __future__ import annotations
 from functools import partial, reduce
 from typing import Any
 
-import click
-
 from frametool.cli import options, poses
 from frametool.cli.command import FILE, Inputs, argument, command_named, misuse, option, refuse
 from frametool.cli.output import Output
@@ -219,12 +217,15 @@ def mean_command(inputs: Inputs) -> int:
             list(poses.read_with(each, request, partial(rows.add, name=name)))
         with misuse("--weights of POSEs are numbers: "):
             numbers = None if weights is None else [parse_number(text.strip()) for text in weights.split(",")]
-        if numbers is not None and len(numbers) != len(rows.named):
-            raise click.UsageError(f"--weights are {len(numbers)}, the poses {len(rows.named)}")
+        count, own = len(rows.named), len(rows.named if numbers is None else numbers)
+        refuse(own != count, f"--weights are {own}, the poses {count}")
     if rows.uncertain:
         warn("covariances left out: mean's is that of the rows")
     if rows.stamped:
         warn("stamps left out: a mean is of no one time")
+    rows.local = (place := task.output.style.place) is not None and place.axes != "ecef"
+    if rows.local:
+        warn(LEFT_OUT.format("a mean at a place"))
     found = [*means_of(rows, numbers, robust=robust)]
     task.output.values([mean for mean, _ in found])
     say_first([line for _, lines in found for line in lines], MOST, "poses left out", warn, warn)
