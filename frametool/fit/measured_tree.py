@@ -1,6 +1,6 @@
 """Estimate a tree from measurements: the pose of each frame in the root, its covariance, and the outliers.
 
-Frames that are fixed to each other form a body; bodies are numbered, 0 is the root's.  A row measures a frame of one
+Frames that are fixed to each other are one body; bodies are numbered, 0 is the root's.  A row measures a frame of one
 body in a frame of another: r = [t(P) - t(M), Log(R(P) R(M)')], P = inv(X_a) X_b.  The poses of the bodies are robust
 least squares: Gauss-Newton, outlier rejection.  Outliers are explained by common mistakes; if another row of the loop
 has one, that row is rejected instead; a loop whose outlier cannot be identified is an error.  Covariances are first
