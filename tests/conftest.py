@@ -7,6 +7,7 @@ import os
 import pathlib
 import re
 import shutil
+import signal
 from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -30,6 +31,9 @@ pytest_plugins = ["selection"]  # what runs by default
 # the same examples in every run, however busy the machine is
 settings.register_profile("steady", deadline=None, derandomize=True, max_examples=60)  # more: -m fuzz, -m large
 settings.load_profile("steady")
+
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # in the background of a script; the commands would ignore it too
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 # terminals, shells, signals and forks are of POSIX; tests of them import what Windows has not
 POSIX = r"(?m)^\s*(?:import|from) (?:browsers|console|fcntl|machine_output|oracles_of_use|pty|readline|resource|shell|termios)\b"

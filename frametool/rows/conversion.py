@@ -35,7 +35,8 @@ from frametool.formats.table import FORMATS, Rows, holds, is_trajectory
 from frametool.frames.stamps import BILLION
 from frametool.geometry.representations import notation
 from frametool.grammar.edges import Answers, Diagnostics, EdgeColumns, Options, Topics
-from frametool.grammar.readers import EARTH_FRAMES
+from frametool.grammar.pose import LEFT_OUT
+from frametool.grammar.readers import EARTH_FRAMES, may_be_uncertain
 from frametool.grammar.result import Style
 from frametool.rows.batch import NO_ROWS, NO_STAMP, RowPoses, block_of, kept
 from frametool.rows.faults import DEGREES, NULL, SKIP, BadRow, Fault, Outcome, written_by
@@ -126,9 +127,7 @@ class FormatConverter:
         """Store the request; raises Misused for options that only apply to tables in their own format."""
         if request.results.keep or (request.results.prefix and not request.operation.extras(Shape(POSE))):
             raise Misused("--keep and --prefix are for tables that stay in their form")
-        self.fmt = fmt
-        self.source = source
-        self.answers = answers
+        self.fmt, self.source, self.answers = fmt, source, answers
         self.tally = Diagnostics()
         self.is_table = FORMATS[fmt].is_table
         self.style = style.changed()
@@ -282,6 +281,8 @@ def read(file: InputFile, options: Options) -> Iterator[EdgeColumns]:
                 wanted = "frames that stand still have parent and name, one that moves stamp or stamp_ns"
                 missing = f"no column {lacking} nor stamp among {rows.columns}; {wanted}, or --stamps FILE"
                 raise FormatError(missing, source=file.name, line=1)
+            if any(map(may_be_uncertain, rows.table.names or ())):
+                options.tally.note(LEFT_OUT.format("a table of frames"), line)
             fmt = fmt if converter.shape.place is None else fmt._replace(frames=(EARTH_FRAMES[0], *fmt.frames[1:]))
         nameless = {
             row: Fault(line + int(block.lines[row]), column, "no name of a frame")

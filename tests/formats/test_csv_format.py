@@ -47,3 +47,10 @@ def test_angles_of_a_tree_that_look_like_degrees_are_a_warning(run: Run) -> None
     said = "rpy 90 is more than a full turn in radians; degrees? name the columns _deg"
     assert run("lookup", "t.csv", "base", "lidar", files=files).err == f"frametool: warning: t.csv:3: {said}\n"
     assert run("check", "t.csv").out == f"t.csv:3:1: warning: {said} [degrees]\n"
+
+
+@pytest.mark.parametrize("column", ["sigma_xyz", "c11", "sigma_yaw_deg"])
+def test_a_covariance_in_a_tree_of_rows_is_left_out_with_a_warning(run: Run, column: str) -> None:
+    files = {"t.csv": f"name,parent,x,y,z,yaw,{column}\na,base,1,2,3,0,0.1\n"}
+    said = "frametool: warning: t.csv:1: covariances left out: a table of frames has none\n"
+    assert run("lookup", "t.csv", "base", "a", files=files).err == said
