@@ -128,9 +128,8 @@ class FormatConverter:
         if request.results.keep or (request.results.prefix and not request.operation.extras(Shape(POSE))):
             raise Misused("--keep and --prefix are for tables that stay in their form")
         self.fmt, self.source, self.answers = fmt, source, answers
-        self.tally = Diagnostics()
         self.is_table = FORMATS[fmt].is_table
-        self.style = style.changed()
+        self.tally, self.style = Diagnostics(), style.changed()
         in_ecef = request.with_results(place=None, last_place=request.results.place)
         self.request = in_ecef.with_results(all_numbers=True, notations=(QUATERNION,), keep_sign=True)
         # each row was checked against TARGET

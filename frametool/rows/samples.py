@@ -262,7 +262,8 @@ def means_of(rows: MeanRows, values: list[float] | None, *, robust: bool) -> Ite
             off = off_text(*length(found.residuals[row].reshape(2, 3)), digits=2)
             place = rows.named[at[row]] if rows.named else rows.place(int(lines[at[row]]))
             left_out.append(f"{place}: left out, {off} off (u {found.u[row]:.1f})")
-        pose = Pose.of(found.transform.components)
+        body = bodies.pop() if len(bodies) == 1 else None
+        pose = Pose.of(found.transform.components, body, max(frames, default=None))
         if placed:
             extras |= {"distance_rms": metres, "distance_max": farthest}
         if turned:
@@ -276,5 +277,4 @@ def means_of(rows: MeanRows, values: list[float] | None, *, robust: bool) -> Ite
                 extras |= {"std_angle": angle, "std_angle_deg": degrees(angle)}
             extras |= uncertain((covariance if turned else covariance[:3, :3]).ravel().tolist())
         position, rotation = pose.position if placed else None, pose.rotation if turned else None
-        body = bodies.pop() if len(bodies) == 1 else None
-        yield Result(Pose(position, rotation, body, max(frames, default=None)), extras), left_out
+        yield Result(pose._replace(position=position, rotation=rotation), extras), left_out

@@ -9,7 +9,7 @@ from frametool.cli import options, poses
 from frametool.cli.command import FILE, Inputs, argument, command_named, misuse, option, refuse
 from frametool.cli.output import Output
 from frametool.cli.sink import say, say_first
-from frametool.cli.streaming import EXPLAIN, Task, one_argument, pose_stream_options
+from frametool.cli.streaming import EXPLAIN, Task, pose_stream_options
 from frametool.errors import warn
 from frametool.grammar.pose import LEFT_OUT, Pose
 from frametool.grammar.result import Result
@@ -109,7 +109,7 @@ def relative_command(inputs: Inputs) -> int:
     """
     task, a, b = Task(inputs, "poses"), inputs.a, inputs.b
     if task.plan:
-        return task.derive("relative", *map(task.read_written, [one_argument(each) for each in (a, b)]))
+        return task.derive("relative", *map(task.read_written, (a, b)))
     if inputs.consecutive or inputs.first:
         velocity = inputs.consecutive and inputs.velocity
         refuse(b is not None, "rows are compared with one of themselves; leave A and B out")
