@@ -94,7 +94,7 @@ def convert_command(inputs: Inputs) -> int:
     if inputs.find is not None:
         output.style = _matching_style(found, inputs.find, inputs.tolerance, output.style)
     if task.plan:
-        refuse(len(found) != 1, f"--explain derives one pose, found {len(found)} among {len(results)} records")
+        refuse(len(found) != 1, f"--explain derives one pose, found {len(found)}")
         source = sources[0] if sources else _source_of(values, request.rows.given, pose if values else found[0])
         change = _named_change(axes, world, operation) if values else None
         return task.derive("convert", task.read_written(source, warned=True), own=found[0], change=change)
