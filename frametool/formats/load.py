@@ -10,7 +10,7 @@ import os
 from contextlib import ExitStack
 from functools import partial
 from importlib import import_module
-from io import BytesIO
+from io import BufferedReader, BytesIO
 from itertools import islice
 from operator import attrgetter, gt, itemgetter, lt
 from os import PathLike
@@ -76,7 +76,7 @@ class FrameFile(InputFile):
     @classmethod
     def inline(cls, source: Source) -> FrameFile:
         """Create from text: a tree written on the command line, or already read."""
-        made = cls(source.name, BytesIO(), "yaml")
+        made = cls(source.name, BufferedReader(BytesIO()), "yaml")
         made.text = source.text
         return made
 

@@ -30,8 +30,9 @@ if TYPE_CHECKING:
 
 # what Windows lacks; libraries that know which system they run on are imported before it is taken away
 LACKING = """
-import multiprocessing.connection, os, select, signal, subprocess, sys, tempfile
+import multiprocessing.connection, os, select, shutil, signal, subprocess, sys, tempfile
 import numpy
+shutil._use_fd_functions = False
 for name in ("fcntl", "grp", "posix", "pty", "pwd", "readline", "resource", "termios", "tty"):
     sys.modules[name] = None
 there = {"SIGABRT", "SIGFPE", "SIGILL", "SIGINT", "SIGSEGV", "SIGTERM", "SIG_DFL", "SIG_IGN"}

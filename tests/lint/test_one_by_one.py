@@ -53,3 +53,8 @@ def test_one_file_that_is_not_there_ends_it(run: Callable[..., Any]) -> None:
 def test_measurements_are_of_one_tree(run: Callable[..., Any]) -> None:
     done = run("check", "--each", "a.yaml", "--measured", "a.yaml", files={"a.yaml": TREE})
     assert done == (2, "", "frametool: check: --measured and --each exclude each other; `frametool check --help` shows the options\n")
+
+
+def test_a_tree_on_the_command_line_is_checked(run: Callable[..., Any]) -> None:
+    assert run("check", "{frames: {a: {b: {xyz: [1, 2, 3]}}}}") == (0, "", "")
+    assert run("check", "{frames: {a: {b: {rpy: [0, 0, 90]}}}}", "--strict").status == 1
