@@ -18,7 +18,7 @@ from frametool.cli.sink import encoded, in_colour, is_special, say, writing
 from frametool.errors import ValueInvalid, first_of, listing, printable, shown, warn
 from frametool.formats import table
 from frametool.geometry.representations import Notation, notation
-from frametool.grammar.result import RecordingStyle, Result, Style, sample_results
+from frametool.grammar.result import SPELLED, RecordingStyle, Result, Style, sample_results
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
@@ -75,7 +75,7 @@ ENDS = (  # the frames of a pose
     r"(?m)^(?P<green>\S.*?)(?: at \S+)? seen from (?P<cyan>.*?)(?: at \S+)?(?=  \(maps|$)",
     r"(?m)\(maps points in (?P<green>.+?) to points in (?P<cyan>.+?)\)$",
 )
-WITH_PLACES = ("text", "yaml", "json", "csv", *table.writers("recording"))
+WITH_PLACES = ("text", *SPELLED, *table.writers("recording"))
 OF_TEXT = (".txt", ".out", ".log", ".dat")
 
 
@@ -159,7 +159,7 @@ class Output:
         from frametool.rows.conversion import Blocks
         from frametool.rows.sinks.results import TOGETHER
 
-        if not (self._in_blocks or self.style.format in ("csv", "json", "yaml")):
+        if not (self._in_blocks or self.style.format in SPELLED):
             self.values(values_of(found, self.style.place))
             return
         self._refuse_places()
@@ -235,7 +235,7 @@ class Output:
         from frametool.rows.sinks.results import CsvTable, Documents
 
         self._refuse_places()
-        if self.style.format in ("csv", "json", "yaml"):
+        if self.style.format in SPELLED:
             return CsvTable(self.style) if self.style.format == "csv" else Documents(self.style)
         if not self._in_blocks:
             return CollectingWriter(self)

@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from frametool.rows.request import Request
 
 INLINE = "argument"
+OPENING = ("{", "[")  # a mapping or list on the command line begins with one of these
 # patterns of the beginning of records and tables
 _MAPPING = r'\s*\{\s*["}\w][^,{]*:'
 _HEADER = r"""\s*(?![ijk]\s*$|[xyzw]:\s*[-+.\d]+\s*,|Out\[)[A-Za-z_"'%#][\w"'-]*\s*(?:[,:\t]|$)"""
@@ -40,7 +41,7 @@ def is_inline(text: str) -> bool:
     """Return True for a mapping or list written on the command line, or the inverse of one; False for a file name."""
     while found := _inverted(text):
         text = (found[1] or found[2] or "").strip()
-    return text.startswith(("{", "["))
+    return text.startswith(OPENING)
 
 
 def is_pasted(text: str, notation: Notation | None = None) -> bool:

@@ -12,6 +12,7 @@ import click
 
 from frametool.cli.command import Inputs, Text, marking_use, refuse, refuse_two_readers, say_if_typed
 from frametool.cli.options import take_stream_format, tree_on_the_line
+from frametool.cli.poses import INLINE, OPENING
 from frametool.cli.sink import say
 from frametool.documents.source import ReadCache, Source
 from frametool.errors import bare, shown, warn
@@ -27,7 +28,6 @@ if TYPE_CHECKING:
     from frametool.formats.robots.model import Robot
     from frametool.frames.lookups import Frames
 
-INLINE = ("{", "[")  # a tree on the command line begins with one of these
 # fields of Answers that are marked as used elsewhere: whether they have an effect depends on formats and motion;
 # other field -> its parameters
 USED_ELSEWHERE = ("time_offset", "frames", "camera_axes")
@@ -54,12 +54,11 @@ def load_sides(inputs: Inputs, a: Sequence[str], b: Sequence[str]) -> list[tuple
     Returns each tree with the places of its frames.
     """
     refuse_two_readers((*a, *b))
-    count = len(a) + len(b)
     sides: list[tuple[Frames, dict[str, EdgePlace]]] = []
     for arguments, behind in ((a, 0), (b, len(a))):
         earth = next((name for name in EARTH_FRAMES if sides and name in sides[0][0].frames), "")
         rules = {"normalize": bool(inputs.normalize), "earth": earth}
-        sides.append(_load(inputs, arguments, rules, placed=True, behind=behind, of=count))
+        sides.append(_load(inputs, arguments, rules, placed=True, behind=behind, of=len(a) + len(b)))
     return sides
 
 
@@ -89,9 +88,9 @@ def _load(
     if cache is None:
         return read()[0]
     inputs.reads_trees = True
-    named = [each if each.startswith(INLINE) else tree_file(each) for each in arguments]
+    named = [each if each.startswith(OPENING) else tree_file(each) for each in arguments]
     key = tuple(named), f"{rules!r} {how} {[inputs.peek(name) for name in OF_FILES]}"
-    paths = [each for each in named if not each.startswith(INLINE) and os.path.exists(each)]
+    paths = [each for each in named if not each.startswith(OPENING) and os.path.exists(each)]
     found, used = cache.read(key, paths, sum(map(len, {*named} - {*paths})), read)
     inputs.use(*used)
     return found
@@ -145,8 +144,8 @@ def opened(
         refuse(not streams and len(values) > files, more)
     format_of_next, general = iter(formats[behind:] or formats), answers(inputs)
     found = opened_together(
-        FrameFile.inline(Source("argument", each))
-        if each.startswith(INLINE)
+        FrameFile.inline(Source(INLINE, each))
+        if each.startswith(OPENING)
         else FrameFile(
             tree_file(each), fmt=next(format_of_next, None), topics=inputs.peek("topics"), answers=general, reads=reads
         )

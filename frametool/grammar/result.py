@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 
 INFINITE = float("inf")
 ROUNDED_TO_ZERO = 1e-12  # smaller numbers, on a screen
+SPELLED = ("csv", "json", "yaml")  # formats of records: every number and other field has a name
 SEEN = ("text", "yaml")  # formats with rounded numbers on a screen
 
 

@@ -37,12 +37,12 @@ from frametool.geometry.representations import notation
 from frametool.grammar.edges import Answers, Diagnostics, EdgeColumns, Options, Topics
 from frametool.grammar.pose import LEFT_OUT
 from frametool.grammar.readers import EARTH_FRAMES, may_be_uncertain
-from frametool.grammar.result import Style
+from frametool.grammar.result import SPELLED, Style
 from frametool.rows.batch import NO_ROWS, NO_STAMP, RowPoses, block_of, kept
 from frametool.rows.faults import DEGREES, NULL, SKIP, BadRow, Fault, Outcome, written_by
 from frametool.rows.request import NO_STAMPS, SOME, Request, RowOptions
 from frametool.rows.shapes import POINT, POSE, Shape
-from frametool.rows.sinks.as_rows import LEARNED, PoseWriter, RowsWriter, SingleWriter, TextWriter
+from frametool.rows.sinks.as_rows import PoseWriter, RowsWriter, SingleWriter, TextWriter
 from frametool.rows.sinks.results import BlockResults, ResultWriter, blocks_of
 from frametool.rows.sources.tables import TableRows
 
@@ -72,7 +72,7 @@ def writer_for(style: Style, first: RowPoses) -> PoseWriter:
 
         return RecordingWriter(style, first)
     text = TextWriter if rows_of(style.format) else SingleWriter
-    return (RowsWriter if style.format in LEARNED else text)(style, first)
+    return (RowsWriter if style.format in SPELLED else text)(style, first)
 
 
 class Blocks(ResultWriter):
@@ -134,7 +134,7 @@ class FormatConverter:
         self.request = in_ecef.with_results(all_numbers=True, notations=(QUATERNION,), keep_sign=True)
         # each row was checked against TARGET
         self.looks_up_places = request.results.place is not None and not request.rows.poses
-        has_nulls = style.format in LEARNED or holds(style.format, "arrays")
+        has_nulls = style.format in SPELLED or holds(style.format, "arrays")
         if request.on_error == NULL and not (self.is_table and has_nulls):
             raise Misused(f"--on-error null: {style.format} of {fmt} cannot hold a row without a result; give skip")
 
@@ -307,8 +307,10 @@ def read(file: InputFile, options: Options) -> Iterator[EdgeColumns]:
         line, count = line + outcome.lines, count + len(block.numbers)
     if len(named) < 2:
         describe(options, fmt, count)
-    options.tally.projected = converter.rows.off * (fmt.rotation == "matrix")
-    options.tally.rough += [1] * (converter.rows.mended * (fmt.rotation != "matrix"))
+    if fmt.rotation == "matrix":
+        options.tally.projected = converter.rows.off
+    else:
+        options.tally.rough += [1] * converter.rows.mended
 
 
 def _edges(block: RowPoses, line: int, fmt: Rows, options: Options) -> EdgeColumns:

@@ -31,7 +31,7 @@ from frametool.formats.table import holds
 from frametool.geometry import floats
 from frametool.grammar.pose import SCALE, Pose
 from frametool.grammar.readers import Misfit, NotARotation, Path, Reading, in_nanoseconds, stamp_column, tell, within
-from frametool.grammar.result import Result, Style, with_entries
+from frametool.grammar.result import SPELLED, Result, Style, with_entries
 from frametool.rows.faults import ZONES, RowNote
 from frametool.rows.holders import outdated, value_at
 from frametool.rows.record import Record, find_records, key_path, pose_of
@@ -51,7 +51,6 @@ ROUNDED = "rounded"  # the rule of the warning for normalised rotations
 MOST_LEAVES = 2000  # scalars of a record from which a template is learned: for more its expression is slow
 MOST_ENTRIES = 8  # points or poses of a record for which rows are made together
 SIX_BY_SIX = 36  # entries of the covariance of a pose
-SPELLED = ("yaml", "json", "csv")  # formats that preserve the names of other keys
 CUT = "some of its poses are beyond --start or --stop: what stays is written to another format, as -f csv"
 
 

@@ -151,8 +151,7 @@ def diff_command(inputs: Inputs) -> int:
     the order of the files: A, those of --with-a, B, those of --with-b; one alone applies to both.
     """
     output = Output(inputs, "report", otherwise="text")
-    sides = (inputs.a, *inputs.with_a), (inputs.b, *inputs.with_b)
-    (one, of_one), (other, of_other) = load_sides(inputs, *sides)
+    (one, of_one), (other, of_other) = load_sides(inputs, (inputs.a, *inputs.with_a), (inputs.b, *inputs.with_b))
     start = inputs.seen_from and frame_name(inputs.seen_from, one)
     comparison = diff(one, other, at_ns=lookup_time_ns(inputs.at), seen_from=start, tolerance=inputs.tolerance)
     inputs.note(*comparison.notes)

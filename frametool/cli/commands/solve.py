@@ -17,7 +17,7 @@ from frametool.cli.trees import answers, load_tree, opened, report_files
 from frametool.errors import ValueInvalid, alternatives, first_of, shown, warn
 from frametool.geometry.rigid import IDENTITY
 from frametool.grammar.pose import Pose
-from frametool.grammar.result import Result, uncertain
+from frametool.grammar.result import SPELLED, Result, uncertain
 from frametool.rows.faults import BadRows
 from frametool.view.reports import Solution, sigma_entry, write_left_out, write_solution
 
@@ -227,7 +227,7 @@ def solve_command(inputs: Inputs) -> None:
     for name in filter(None, (report, path)):
         refuse_existing(name, force=force)
     output = Output(inputs, "tree", "trajectory")
-    if points and inputs.scale and output.style.format not in ("text", "yaml", "json", "csv"):
+    if points and inputs.scale and output.style.format not in ("text", *SPELLED):
         raise ValueInvalid(f"{output.style.format} has no place for a scale; write json, yaml or csv")
     solve = solved_hand_eye if hand_eye else solved_points if points else solved_tree
     found = solve(inputs, files, robust=not inputs.no_robust)

@@ -17,9 +17,9 @@ from frametool.formats.rows.csv import cells_of
 from frametool.geometry import floats
 from frametool.geometry.representations import notation
 from frametool.grammar.readers import in_nanoseconds
-from frametool.grammar.result import Result, Style
+from frametool.grammar.result import SPELLED, Result, Style
 from frametool.rows.batch import RowPoses, chosen, read_stamps
-from frametool.rows.plain import MOST_ENTRIES, SPELLED, Answer, stamp_key, values_of_unit
+from frametool.rows.plain import MOST_ENTRIES, Answer, stamp_key, values_of_unit
 from frametool.rows.request import target_of
 from frametool.rows.shapes import POINT, POSE, ROTATION, VECTOR, Shape
 from frametool.rows.sinks import as_rows

@@ -28,7 +28,7 @@ from frametool.frames.stamps import BILLION, format_stamp
 from frametool.geometry import arrays, floats, quaternion, rigid
 from frametool.grammar.pose import SCALE
 from frametool.grammar.readers import EARTH_FRAMES
-from frametool.grammar.result import Result, Style
+from frametool.grammar.result import SPELLED, Result, Style
 from frametool.rows.batch import (
     SOME_STAMPS,
     RowPoses,
@@ -55,7 +55,6 @@ if TYPE_CHECKING:
     from frametool.geometry import Components
     from frametool.rows.plain import Value
 
-LEARNED = ("csv", "json", "yaml")
 LOSABLE = ("names of frames", "stamps")
 NUMBERED = "without stamps, poses are numbered in seconds: 0, 1, 2 .."
 
@@ -279,7 +278,7 @@ def refuse_infinite(values: Floats) -> None:
 
 def refuse_scale_in(fmt: str, extra: Iterable[str]) -> None:
     """Raise ValueInvalid if a format has no place for the scale of a similarity."""
-    if SCALE in extra and fmt not in ("text", *LEARNED):
+    if SCALE in extra and fmt not in ("text", *SPELLED):
         raise ValueInvalid(f"{fmt} has no place for a scale; write json, yaml or csv")
 
 
